@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A prepared head on disk: one .npz that a render worker loads with numpy alone.
+
+Vertices are in frame U, in millimetres, with the pivot at the origin. Texture
+paths point to the source's own files.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from generator.heads.mesh import HeadMesh, Material
+
+
+def save_package(mesh: HeadMesh, path: Path) -> None:
+    """Write mesh (frame U, mm, pivot at the origin) to path (.npz)."""
+    materials = [
+        {
+            "name": m.name,
+            "base_color": list(m.base_color),
+            "texture": str(m.texture) if m.texture else None,
+            "cutout": m.cutout,
+        }
+        for m in mesh.materials
+    ]
+    arrays = {
+        "vertices": mesh.vertices,
+        "triangles": mesh.triangles,
+        "material_index": mesh.material_index,
+        "materials": np.array(json.dumps(materials)),
+    }
+    if mesh.uv is not None:
+        arrays["uv"] = mesh.uv
+    if mesh.vertex_colors is not None:
+        arrays["vertex_colors"] = mesh.vertex_colors
+    np.savez(path, **arrays)
+
+
+def load_package(path: Path) -> HeadMesh:
+    """The inverse of :func:`save_package`. Never unpickles."""
+    with np.load(path, allow_pickle=False) as data:
+        materials = tuple(
+            Material(
+                m["name"],
+                tuple(m["base_color"]),
+                Path(m["texture"]) if m["texture"] else None,
+                m["cutout"],
+            )
+            for m in json.loads(str(data["materials"]))
+        )
+        return HeadMesh(
+            vertices=data["vertices"],
+            triangles=data["triangles"],
+            uv=data["uv"] if "uv" in data else None,
+            vertex_colors=data["vertex_colors"] if "vertex_colors" in data else None,
+            material_index=data["material_index"],
+            materials=materials,
+        )
