@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The host's side of a render worker."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from generator.errors import HeadError, UsageError, WorkerError
+from generator.execution.lines import LineProcess
+from generator.plan.render_settings import RenderSettings
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def worker_command(blender: str | None, threads: int) -> list[str]:
+    """How a render worker is started: inside a Blender executable, or with the bpy wheel.
+
+    Raises UsageError if the executable does not exist, or bpy is not installed.
+    """
+    if blender is not None:
+        if not os.access(blender, os.X_OK):
+            raise UsageError(f"{blender}: not an executable Blender; give the path of one, or leave --blender out")
+        script = str(_PACKAGE / "blender" / "worker.py")
+        flags = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", script]
+        return [blender, *flags, "--", str(threads)]
+    if find_spec("bpy") is None:
+        raise UsageError(
+            "bpy is not installed: pip install 'headturn[build]' with Python 3.11, or name a Blender with --blender"
+        )
+    return [sys.executable, "-m", "generator.blender.worker", str(threads)]
+
+
+class Renderer:
+    """One render worker and the folder its frames appear in.
+
+    Parameters
+    ----------
+    frames: an existing folder, best on a tmpfs.
+    blender: a Blender executable; None uses the bpy wheel.
+    threads: Cycles threads; 0 means every core.
+    """
+
+    def __init__(self, frames: Path, log: Path, *, blender: str | None = None, threads: int = 0) -> None:
+        self.frames = frames
+        path = os.pathsep.join([str(_PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+        # A Blender executable must not see our environment: its Python is another one.
+        env = {"PYTHONPATH": path} if blender is None else {"PYTHONPATH": ""}
+        self._process = LineProcess(worker_command(blender, threads), log, env)
+        ready = self._process.receive()
+        if "ready" not in ready:
+            raise WorkerError(f"the render worker did not start: {ready}")
+        self.version: str = ready["ready"]
+
+    @property
+    def pid(self) -> int:
+        """Process id of the render worker."""
+        return self._process.pid
+
+    def render(
+        self,
+        package: Path,
+        settings: RenderSettings,
+        distance_mm: float,
+        poses: Sequence[Sequence[float]],
+        *,
+        frame_format: str = "bmp",
+    ) -> Iterator[Path]:
+        """Render poses [(yaw, pitch, roll) degrees, ...] of a prepared head.
+
+        Yields each frame's path as soon as it is written; the caller removes it.
+        Raises HeadError if Blender cannot load the head, WorkerError if the
+        worker dies.
+        """
+        self._process.send(
+            {
+                "op": "render",
+                "package": str(package),
+                "settings": settings.as_dict(),
+                "distance_mm": distance_mm,
+                "poses": [list(map(float, pose)) for pose in poses],
+                "out": str(self.frames),
+                "format": frame_format,
+            }
+        )
+        for receipt in self._receipts():
+            if "path" in receipt:
+                yield Path(receipt["path"])
+
+    def convert(self, source: Path, target: Path) -> Path:
+        """Have Blender read an FBX file and write it as GLB to target."""
+        self._process.send({"op": "convert", "source": str(source), "target": str(target)})
+        for _ in self._receipts():
+            pass
+        return target
+
+    def close(self) -> None:
+        """End the worker."""
+        self._process.close()
+
+    def kill(self) -> None:
+        """End the worker now."""
+        self._process.kill()
+
+    def _receipts(self) -> Iterator[dict]:
+        while True:
+            receipt = self._process.receive()
+            if "error" in receipt:
+                raise HeadError(f"Blender: {receipt['error']}")
+            yield receipt
+            if "done" in receipt:
+                return

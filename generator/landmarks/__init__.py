@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmark detectors. Surface anchors (exact landmarks) will live here too."""
