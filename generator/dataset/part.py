@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One unit of work as one Parquet file: build the table, commit it, read it back."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from generator.dataset.digest import NO_ROWS, add_digests, content_digest
+from generator.dataset.files import file_sha256, one_line, write_atomically, write_bytes
+from generator.dataset.schema import (
+    LANDMARK_COLUMNS,
+    LANDMARKS,
+    check_name,
+    image_mode,
+    image_path,
+    sample_id,
+)
+from generator.errors import DatasetError
+from generator.geometry.camera import Camera
+from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
+from generator.plan.poses import ANGLES, pose_name
+
+ROW_GROUP = 1024
+BATCH = 256
+"""Rows read at once: bounds the memory of a check when images are embedded."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitRows:
+    """What rendering and detecting one unit gives: one head, N poses.
+
+    angles_deg     float64 [N, 3] (yaw, pitch, roll); indices int16 [N, 3]: rows of a PosePlan
+    camera         the camera of every row
+    detected       bool [N]
+    landmarks      float32 [N, 468, 3], isotropic pixels, frame C; NaN where not detected
+    images         N encoded image files; image_suffix is theirs, such as ".png"
+    """
+
+    subject: str
+    expression: str
+    split: str
+    head_license: str
+    redistributable: bool
+    angles_deg: np.ndarray
+    indices: np.ndarray
+    camera: Camera
+    detected: np.ndarray
+    landmarks: np.ndarray
+    images: Sequence[bytes]
+    image_suffix: str = ".png"
+
+    def __post_init__(self) -> None:
+        count = len(self.angles_deg)
+        shapes = {
+            "angles_deg": (self.angles_deg.shape, (count, 3)),
+            "indices": (self.indices.shape, (count, 3)),
+            "detected": (self.detected.shape, (count,)),
+            "landmarks": (self.landmarks.shape, (count, LANDMARKS, 3)),
+            "images": ((len(self.images),), (count,)),
+        }
+        for name, (actual, expected) in shapes.items():
+            if actual != expected:
+                raise ValueError(f"{name}: expected shape {expected}, got {actual}")
+        finite = np.isfinite(self.landmarks).all(axis=(1, 2))
+        missing = np.isnan(self.landmarks).all(axis=(1, 2))
+        if not np.where(self.detected, finite, missing).all():
+            raise ValueError("landmarks must be finite where detected and all NaN where not")
+        for what in ("subject", "expression", "split"):
+            check_name(what, getattr(self, what))
+
+    @property
+    def poses(self) -> list[str]:
+        """The name of each pose."""
+        return [pose_name(*angles) for angles in self.angles_deg.tolist()]
+
+    @property
+    def image_paths(self) -> list[str]:
+        """Where each image is stored with images = "files", relative to the dataset."""
+        return [image_path(self.subject, self.expression, pose, self.image_suffix) for pose in self.poses]
+
+
+@dataclass(frozen=True)
+class PartInfo:
+    """One part as the manifest lists it.
+
+    path: relative to the dataset, with "/". bytes and sha256: of the file.
+    digest: of the content, see :mod:`generator.dataset.digest`.
+    subject, expression: "" where the part holds several.
+    """
+
+    path: str
+    rows: int
+    detected: int
+    bytes: int
+    sha256: str
+    digest: str
+    subject: str
+    expression: str
+
+
+def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
+    """The table of one unit, in the order of rows. schema: :func:`generator.dataset.schema.part_schema`."""
+    count = len(rows.angles_deg)
+    mode = image_mode(schema)
+    rotation = rotation_from_angles(rows.angles_deg)
+    same_everywhere: dict[str, Any] = {
+        "subject": rows.subject,
+        "expression": rows.expression,
+        "split": rows.split,
+        "head_license": rows.head_license,
+        "redistributable": rows.redistributable,
+        "camera": rows.camera.matrix,
+        "translation_mm": rows.camera.translation_mm,
+        "width": rows.camera.resolution,
+        "height": rows.camera.resolution,
+    }
+    values: dict[str, Any] = {
+        **{name: np.broadcast_to(v, (count, *np.shape(v))) for name, v in same_everywhere.items()},
+        "sample_id": [sample_id(rows.subject, rows.expression, pose) for pose in rows.poses],
+        "rotation": rotation,
+        "quaternion": quaternion_from_rotation(rotation),
+        "detected": rows.detected,
+        "landmarks": rows.landmarks,
+        "image_path": rows.image_paths if mode == "files" else [""] * count,
+        "image_sha256": [hashlib.sha256(image).hexdigest() for image in rows.images],
+    }
+    for axis, angle in enumerate(ANGLES):
+        values[f"{angle}_deg"] = rows.angles_deg[:, axis]
+        values[f"{angle}_index"] = rows.indices[:, axis]
+    if mode == "embedded":
+        names = [path.rpartition("/")[2] for path in rows.image_paths]
+        values["image"] = [{"bytes": b, "path": n} for b, n in zip(rows.images, names, strict=True)]
+    return pa.table([_column(values[field.name], field.type) for field in schema], schema=schema)
+
+
+def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
+    """Commit a table as ``data/<split>/part-<unit>.parquet`` under root, all or nothing.
+
+    The file is read back and its content compared with the table before it
+    takes its name.
+
+    Raises
+    ------
+    DatasetError: the disk is full, the folder is not writable, or what was
+        read back is not what was written.
+    """
+    check_name("split", split)
+    check_name("unit", unit)
+    path = root / "data" / split / f"part-{unit}.parquet"
+
+    def check(temporary: Path) -> PartInfo:
+        info = check_part(temporary)
+        if info.rows != len(table) or info.digest != content_digest(table):
+            raise DatasetError(f"{path}: what was read back differs from what was written; check the disk")
+        return replace(info, path=f"data/{split}/{path.name}")
+
+    return write_atomically(path, lambda file: _write_table(table, file), check)
+
+
+def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> PartInfo:
+    """Store one unit: its image files where images = "files", then its part.
+
+    Raises DatasetError as :func:`write_part` does; then the part is not there.
+    """
+    table = unit_table(rows, schema)
+    if image_mode(schema) == "files":
+        for relative, image in zip(rows.image_paths, rows.images, strict=True):
+            write_bytes(root / relative, image)
+    return write_part(table, root, rows.split, unit)
+
+
+def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
+    """The rows of one part in batches of at most 256, page checksums verified.
+
+    Raises DatasetError: the file is missing, cut short or damaged.
+    """
+    with _reading(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
+        yield from file.iter_batches(batch_size=BATCH)
+
+
+def part_schema_of(path: Path) -> pa.Schema:
+    """Schema of one part with its metadata. Raises DatasetError as :func:`iter_part` does."""
+    with _reading(path):
+        return pq.read_schema(path)
+
+
+def read_part(path: Path) -> pa.Table:
+    """All rows of one part. Raises DatasetError as :func:`iter_part` does."""
+    schema = part_schema_of(path)
+    return pa.Table.from_batches(iter_part(path), schema=schema)
+
+
+def check_part(path: Path) -> PartInfo:
+    """Read a part from the first byte to the last and say what it holds.
+
+    path: ``<dataset>/data/<split>/<name>``.
+    Raises DatasetError as :func:`iter_part` does, or if its columns are not those of a part.
+    """
+    rows, detected, digests = 0, 0, [NO_ROWS]
+    heads: set[tuple[str, str]] = set()
+    for batch in iter_part(path):
+        with _reading(path):
+            digests.append(content_digest(batch))
+            detected += pc.sum(batch.column("detected")).as_py()
+            heads.update(zip(*(batch.column(n).to_pylist() for n in ("subject", "expression")), strict=True))
+        rows += len(batch)
+    subject, expression = heads.pop() if len(heads) == 1 else ("", "")
+    return PartInfo(
+        path="/".join(path.parts[-3:]),
+        rows=rows,
+        detected=detected,
+        bytes=path.stat().st_size,
+        sha256=file_sha256(path),
+        digest=add_digests(digests),
+        subject=subject,
+        expression=expression,
+    )
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
+        raise DatasetError(
+            f"{path}: not a readable part ({one_line(error)}); delete it and run `headturn build` again"
+        ) from error
+
+
+def _column(values: Any, kind: pa.DataType) -> pa.Array:
+    if not pa.types.is_fixed_size_list(kind):
+        return pa.array(values, type=kind)
+    flat = np.ascontiguousarray(values, dtype=kind.value_type.to_pandas_dtype()).reshape(-1)
+    return pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind)
+
+
+def _write_table(table: pa.Table, file: BinaryIO) -> None:
+    lists = [field.name for field in table.schema if pa.types.is_nested(field.type)]
+    scalars = [name for name in table.schema.names if name not in lists]
+    pq.write_table(
+        table,
+        file,
+        row_group_size=ROW_GROUP,
+        compression="zstd",
+        use_dictionary=[name for name in scalars if pa.types.is_string(table.schema.field(name).type)],
+        use_byte_stream_split=[f"{name}.list.element" for name in LANDMARK_COLUMNS],
+        write_statistics=scalars,
+        write_page_index=True,
+        write_page_checksum=True,
+    )

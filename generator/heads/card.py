@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``head.json``: what a subject's folder says about itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from generator.errors import HeadError
+from generator.heads.paths import quoted
+
+CARD_NAME = "head.json"
+MAX_CARD_BYTES = 1 << 22
+
+Axis = Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"]
+
+
+class CardExpression(BaseModel):
+    """One mesh; further keys are the writer's own."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+    file: str
+
+
+class HeadCard(BaseModel):
+    """Trusted over every guess. ``expressions`` maps names to files in the folder."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+    source: str = "mesh"
+    subject: str | None = None
+    license: str = "unknown"
+    redistributable: bool = False
+    attribution: str = ""
+    units: Literal["um", "mm", "cm", "dm", "m"] | None = None
+    up: Axis | None = None
+    forward: Axis | None = None
+    expressions: dict[str, str | CardExpression]
+
+    def files(self) -> dict[str, str]:
+        """File name of each expression."""
+        return {k: v if isinstance(v, str) else v.file for k, v in self.expressions.items()}
+
+
+def read_card(path: Path) -> HeadCard:
+    """The card in a file.
+
+    Raises
+    ------
+    HeadError: not JSON, or a field is missing or of the wrong kind.
+    """
+    try:
+        if path.stat().st_size > MAX_CARD_BYTES:
+            raise HeadError(f"{path} is larger than {MAX_CARD_BYTES >> 20} MB, which no head.json is")
+        return HeadCard.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise HeadError(f"{path}: {quoted(where)}: {' '.join(first['msg'].split())}; correct it") from error
+    except OSError as error:
+        raise HeadError(f"{path} cannot be read: {error.strerror}") from error

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names and files that strangers chose: what may become a subject, what may be opened.
+
+A head's folder is data, often from an archive somebody else packed. Nothing a
+material file says may reach outside of that folder.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import unicodedata
+from pathlib import Path
+
+from generator.errors import HeadError
+
+MAX_NAME_LENGTH = 100
+_DRIVE = re.compile(r"^[A-Za-z]:")
+_RESERVED = frozenset('/\\<>:"|?*')
+_NUMBER = re.compile(r"(\d+)")
+
+
+class MissingFile(HeadError):
+    """A file that a head names is not in the head's folder."""
+
+
+def printable(text: str) -> str:
+    """A stranger's text on one line: what no terminal should get is escaped."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def quoted(text: str) -> str:
+    """A stranger's name in quotes, for a message."""
+    return f"'{printable(text if len(text) <= 80 else text[:77] + '...')}'"
+
+
+def check_name(name: str, what: str) -> str:
+    """``name``, if it can be an identity that later becomes part of a file name.
+
+    Raises
+    ------
+    HeadError: it is empty or long, holds a path separator, "..", a control
+        character or bytes that are not text, or begins or ends with a dot or a blank.
+    """
+    if not name or len(name) > MAX_NAME_LENGTH:
+        raise HeadError(f"the {what} {quoted(name)} must have 1 to {MAX_NAME_LENGTH} characters; rename it")
+    if any(unicodedata.category(c).startswith(("C", "Z")) and c != " " for c in name):
+        raise HeadError(f"the {what} {quoted(name)} holds characters that cannot be printed; rename it")
+    if set(name) & _RESERVED or ".." in name or name.strip(" .") != name:
+        raise HeadError(f"the {what} {quoted(name)} could be mistaken for a path; rename it")
+    return name
+
+
+def natural_key(text: str) -> tuple[tuple[int, int, str], ...]:
+    """Sorting key that puts 2 before 10."""
+    return tuple(
+        (0, int(part), "") if part.isdecimal() else (1, 0, part) for part in _NUMBER.split(text) if part
+    )
+
+
+def find_inside(folder: Path, name: str, what: str) -> Path:
+    """The file called ``name`` in ``folder`` or below it.
+
+    Backslashes count as slashes, and upper and lower case are the same where
+    no exact match exists: material files are mostly written on Windows.
+
+    Raises
+    ------
+    MissingFile: there is no such file.
+    HeadError: the name is absolute, or leaves the folder (also through a link).
+    """
+    slashed = name.strip().replace("\\", "/")
+    if not slashed or any(unicodedata.category(c) == "Cc" for c in slashed):
+        raise HeadError(f"the {what} has the name {quoted(name)}; write a file name there")
+    if slashed.startswith("/") or _DRIVE.match(slashed):
+        raise HeadError(f"the {what} {quoted(name)} is an absolute path; put the file beside the mesh "
+                        "and write only its name")  # fmt: skip
+    parts = posixpath.normpath(slashed).split("/")
+    if parts[0] == "..":
+        raise HeadError(f"the {what} {quoted(name)} lies outside of the head's folder; put it inside")
+    found = folder
+    for part in parts:
+        found = _child(found, part, name, what)
+    real = found.resolve()
+    if not real.is_relative_to(folder.resolve()):
+        raise HeadError(f"the {what} {found} is a link out of the head's folder; put the file itself there")
+    if not real.is_file():
+        raise HeadError(f"the {what} {found} is not a file")
+    return found
+
+
+def _child(folder: Path, part: str, name: str, what: str) -> Path:
+    try:
+        exact = folder / part
+        if exact.exists() or exact.is_symlink():
+            return exact
+        for other in sorted(folder.iterdir()):
+            if other.name.casefold() == part.casefold():
+                return other
+    except OSError as error:
+        raise HeadError(f"cannot look for the {what} {quoted(name)} in {folder}: {error.strerror}") from error
+    raise MissingFile(f"the {what} {quoted(name)} is missing; put it into {folder} or out of the mesh")

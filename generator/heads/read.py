@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a head on disk to plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from generator.errors import HeadError
+from generator.heads.eyeballs import add_eyeballs
+from generator.heads.gltf import read_gltf
+from generator.heads.head import Head
+from generator.heads.mesh import HeadMesh
+from generator.heads.obj import read_obj
+from generator.heads.paths import printable
+from generator.heads.ply import read_ply
+from generator.heads.weld import weld
+
+MAX_MESH_BYTES = 1 << 30
+
+ImportWithBlender = Callable[[Path, Path], Path]
+"""(FBX file, scratch folder) -> the GLB that Blender made of it."""
+
+
+def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlender | None = None) -> HeadMesh:
+    """The mesh of a head in its own units and axes, one vertex per position.
+
+    FaceScape's eye holes get eyeballs, and its mouth a dark inside.
+
+    Parameters
+    ----------
+    scratch: an existing folder of this head alone; textures that the mesh
+        embeds or that are made for it are written there.
+    import_with_blender: converts FBX; None where no Blender can be run.
+
+    Raises
+    ------
+    HeadError: the mesh or one of its textures cannot be used; the message
+        names the file.
+    """
+    path = head.mesh_path
+    try:
+        if path.stat().st_size > MAX_MESH_BYTES:
+            raise HeadError(f"larger than {MAX_MESH_BYTES >> 30} GB; reduce the mesh")
+        if head.source == "facescape":
+            return add_eyeballs(weld(read_obj(path, scratch, texture=head.files[-1])), scratch)
+        return weld(_read(path, scratch, import_with_blender))
+    except HeadError as error:
+        raise HeadError(printable(f"{path}: {error}")) from error
+    except OSError as error:
+        raise HeadError(printable(f"{path}: cannot be read ({error.strerror})")) from error
+
+
+def _read(path: Path, scratch: Path, import_with_blender: ImportWithBlender | None) -> HeadMesh:
+    match path.suffix.lower():
+        case ".obj":
+            return read_obj(path, scratch)
+        case ".ply":
+            return read_ply(path)
+        case ".glb" | ".gltf":
+            return read_gltf(path, scratch)
+        case ".fbx":
+            if import_with_blender is None:
+                raise HeadError("FBX is read by Blender, which is not available here; convert it to GLB")
+            return read_gltf(import_with_blender(path, scratch), scratch)
+    raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB or FBX")

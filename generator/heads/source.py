@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One door to every head source."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from generator.errors import HeadError, UsageError
+from generator.heads.facescape import EXPRESSIONS, LICENSE, expression_number, find_facescape
+from generator.heads.folders import SUFFIXES, UNKNOWN_LICENSE, find_meshes
+from generator.heads.head import Head, HeadSource, SkippedHead
+from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
+
+
+def find_heads(
+    path: Path,
+    *,
+    expressions: Sequence[str] | None = None,
+    license: str | None = None,
+    redistributable: bool | None = None,
+    units: str | None = None,
+    up: str | None = None,
+    forward: str | None = None,
+) -> HeadSource:
+    """The heads under ``path``, numbers in numerical order. Meshes are not parsed.
+
+    Parameters
+    ----------
+    path: a FaceScape download (or any folder of it), a mesh file, a folder of
+        meshes, or a folder of such folders up to three deep.
+    expressions: which to take, by name ("smile"), FaceScape number ("2") or
+        both ("2_smile"); None takes all.
+    license, redistributable, units, up, forward: override what the source says
+        or what would be guessed. FaceScape's licence cannot be overridden.
+
+    Raises
+    ------
+    UsageError: no such path, no heads in it, an unknown expression or unit,
+        impossible axes, or an attempt to widen FaceScape's licence.
+    """
+    path = Path(path).absolute()
+    if ".." in path.parts:
+        path = path.resolve()
+    if not path.exists():
+        raise UsageError(f"no such file or folder: {path}")
+    if units is not None and units not in MM_PER_UNIT:
+        raise UsageError(f"unknown unit {units!r}; one of {', '.join(MM_PER_UNIT)}")
+    for text, option in ((up, "--up"), (forward, "--forward")):
+        if text is not None:
+            axis_vector(text, option)
+    if up is not None and forward is not None:
+        axes_rotation(up, forward)
+    try:
+        kind = "facescape"
+        heads, skipped = find_facescape(path)
+        if not heads and not skipped:
+            heads, skipped = find_meshes(path)
+            kind = heads[0].source if heads and len({h.source for h in heads}) == 1 else "mesh"
+    except (HeadError, OSError) as error:
+        raise UsageError(f"{path} cannot be searched: {error}") from error
+    if not heads and not skipped:
+        raise UsageError(_nothing_found(path))
+    if kind == "facescape" and (redistributable or license not in (None, LICENSE)):
+        raise UsageError(f"{path} is FaceScape, whose licence is fixed; remove --license, --redistributable")
+    if expressions is not None:
+        heads, skipped = _select(heads, skipped, expressions)
+    given = [
+        replace(
+            head,
+            license=head.license if license is None else license,
+            redistributable=head.redistributable if redistributable is None else redistributable,
+            units=units or head.units,
+            up=up or head.up,
+            forward=forward or head.forward,
+            problems=tuple(p for p in head.problems if p != UNKNOWN_LICENSE or license is None),
+        )
+        for head in heads
+    ]
+    return HeadSource(path, kind, tuple(given), tuple(skipped))
+
+
+def _nothing_found(path: Path) -> str:
+    archives = sorted(path.glob("*.zip")) if path.is_dir() else []
+    if archives:
+        return f"no heads in {path}, but {archives[0].name}: unzip it first"
+    return f"no heads in {path}; expected {', '.join(SUFFIXES)} files or FaceScape's numbered folders"
+
+
+def _select(
+    heads: list[Head], skipped: list[SkippedHead], wanted: Sequence[str]
+) -> tuple[list[Head], list[SkippedHead]]:
+    """Heads of the wanted expressions; subjects that lack one are skipped with that reason."""
+    existing = {head.expression for head in heads} | {head.expression for head in skipped}
+    chosen = dict.fromkeys(_resolve(text, existing) for text in wanted)
+    taken = [head for head in heads if head.expression in chosen]
+    missed = [head for head in skipped if head.expression in chosen]
+    known = {(h.subject, h.expression) for h in taken} | {(h.subject, h.expression) for h in missed}
+    for subject, first in {h.subject: h for h in reversed(heads)}.items():
+        missed += [
+            SkippedHead(subject, expression, first.mesh_path.parent, f"this subject has no {expression!r}")
+            for expression in chosen
+            if (subject, expression) not in known
+        ]
+    return taken, missed
+
+
+def _resolve(text: str, existing: set[str]) -> str:
+    """The expression a user means."""
+    plain = text.strip()
+    for expression in sorted(existing):
+        number = expression_number(expression)
+        names = {expression.casefold()} | ({str(number), f"{number}_{expression}"} if number else set())
+        if plain.casefold() in names:
+            return expression
+    order = {name: i for i, name in enumerate(EXPRESSIONS)}
+    listed = sorted(existing, key=lambda name: (order.get(name, len(order)), name))
+    raise UsageError(f"unknown expression {text!r}; there are: {', '.join(listed)}")

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from generator.dataset.heads_table import read_heads, write_heads
+from generator.dataset.manifest import read_manifest, write_manifest
+from generator.dataset.part import check_part, read_part
+from generator.dataset.verify import VerifyReport, verify_dataset
+from generator.plan.poses import sobol_plan
+
+PART = "data/train/part-s1-0.parquet"
+
+
+def failures(report: VerifyReport) -> dict[str, str]:
+    assert all("\n" not in check.detail and "Traceback" not in check.detail for check in report.checks)
+    return {check.name: check.detail for check in report.checks if not check.ok}
+
+
+def rewrite(root: Path, change: dict[str, list], *, honest: bool, part: str = PART) -> None:
+    """Change columns of one part; honest = the manifest is made to agree with the new file."""
+    table = read_part(root / part)
+    for name, values in change.items():
+        field = table.schema.field(name)
+        table = table.set_column(table.schema.get_field_index(name), field, pa.array(values, type=field.type))
+    pq.write_table(table, root / part)
+    if honest:
+        manifest = read_manifest(root)
+        parts = tuple(check_part(root / p.path) if p.path == part else p for p in manifest.parts)
+        write_manifest(replace(manifest, parts=parts), root)
+
+
+@pytest.mark.parametrize("images", ["none", "files", "embedded"])
+def test_a_good_dataset(build, tmp_path, images):
+    build(tmp_path / "d", images)
+    steps = []
+    report = verify_dataset(tmp_path / "d", progress=lambda done, total: steps.append((done, total)))
+    assert report.ok, report.text()
+    assert steps == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert (report.heads, report.poses, report.rows, report.detected_rows) == (2, 18, 36, 32)
+    assert report.rate_by_subject == {"s1": 16 / 18, "s2": 16 / 18}
+    worst = report.worst_cells[0]
+    assert (worst.yaw_deg, worst.pitch_deg, worst.rows, worst.rate) == (30, 20, 4, 0)
+    assert report.worst_cells[1].rate == 1
+    json.dumps(report.as_dict(), allow_nan=False)
+    assert "yaw +30, pitch +20: 0% of 4" in report.text()
+
+
+def test_poses_off_the_grid(build, tmp_path):
+    build(tmp_path / "d", "none", plan=sobol_plan(40, 1))
+    report = verify_dataset(tmp_path / "d")
+    assert report.ok, report.text()
+    assert {cell.yaw_deg % 10 for cell in report.cells} == {0}
+    assert sum(cell.rows for cell in report.cells) == 80
+
+
+def test_a_deleted_part(dataset):
+    (dataset / PART).unlink()
+    problems = failures(verify_dataset(dataset))
+    assert problems["part files"] == f"{PART} is missing"
+    assert problems["every row once"] == (
+        "s1/neutral/y-30_p-20_r+0 is missing; s1/neutral/y-30_p-20_r+10 is missing; "
+        "s1/neutral/y-30_p+0_r+0 is missing and 7 more"
+    )
+    assert set(problems) == {"part files", "every row once", "digest"}
+
+
+def test_failed_units_are_named_beside_the_missing_rows(dataset):
+    manifest = read_manifest(dataset)
+    (dataset / PART).unlink()
+    parts = tuple(part for part in manifest.parts if part.path != PART)
+    write_manifest(replace(manifest, parts=parts, failures=1), dataset)
+    problems = failures(verify_dataset(dataset))
+    assert set(problems) == {"every row once"}
+    assert problems["every row once"].startswith("1 units failed, see failures.jsonl; s1/neutral/")
+
+
+@pytest.mark.parametrize("place", np.linspace(0, 0.999, 24).tolist())
+def test_a_flipped_bit_anywhere(dataset, place):
+    content = bytearray((dataset / PART).read_bytes())
+    content[int(place * len(content))] ^= 4
+    (dataset / PART).write_bytes(content)
+    problems = failures(verify_dataset(dataset))
+    assert f"{PART} was changed or damaged after the build" in problems["part hashes"]
+
+
+@pytest.mark.parametrize("keep", [0, 3, 4000, -9])
+def test_a_truncated_part(dataset, keep):
+    (dataset / PART).write_bytes((dataset / PART).read_bytes()[:keep])
+    problems = failures(verify_dataset(dataset))
+    assert "SHA-256 differs" in problems["part hashes"] and "not a readable part" in problems["part hashes"]
+    assert "and 7 more" in problems["every row once"]
+
+
+def test_a_tampered_label(dataset):
+    yaw = read_part(dataset / PART)["yaw_deg"].to_pylist()
+    rewrite(dataset, {"yaw_deg": [0.0, *yaw[1:]]}, honest=False)
+    problems = failures(verify_dataset(dataset))
+    assert set(problems) == {"part hashes", "every row once", "identity", "rotation", "digest"}
+    assert "y-30_p-20_r+0: rotation does not agree with the angles" in problems["rotation"]
+    assert f"{PART} holds other values than the manifest says" in problems["digest"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "check", "message"),
+    [
+        ("yaw_deg", 0.0, "every row once", "y-30_p-20_r\\+0 is missing"),
+        ("yaw_deg", 12.0, "every row once", "y-30_p-20_r\\+0 is not in heads.parquet x poses.csv"),
+        ("yaw_deg", float("nan"), "every row once", "is not in heads.parquet"),
+        ("subject", "s3", "every row once", "is not in heads.parquet"),
+        ("sample_id", "x/y/z", "identity", "x/y/z should be called s1/neutral/y-30_p-20_r\\+0"),
+        ("split", "test", "identity", "split 'test' in data/train"),
+        ("head_license", "MIT", "identity", "licence differs"),
+        ("redistributable", False, "identity", "licence differs"),
+        ("yaw_index", 1, "identity", "place in the grid differs"),
+        ("rotation", [1.0, 0, 0, 0, 1, 0, 0, 0, 1], "rotation", "rotation does not agree"),
+        ("quaternion", [1.0, 0, 0, 0], "rotation", "quaternion does not agree"),
+        ("camera", [1.0] * 9, "camera", "camera differs from heads.parquet"),
+        ("translation_mm", [0.0, 0, 701], "camera", "translation_mm differs"),
+        ("height", 65, "camera", "square image"),
+        ("detected", False, "landmarks", "not detected, but a landmark is not NaN"),
+        ("landmarks", [float("nan")] + [0.0] * 1403, "landmarks", "detected, but a landmark is not finite"),
+        ("image_sha256", "0" * 64, "images", "SHA-256 differs"),
+        ("image_path", "images/s1/neutral/y-30_p-20_r+10.png", "images", "not where its image belongs"),
+        ("image_path", "../../secret.png", "images", "not where its image belongs"),
+    ],
+)
+def test_wrong_values_are_found_even_if_the_manifest_was_made_to_agree(dataset, name, value, check, message):
+    values = read_part(dataset / PART)[name].to_pylist()
+    rewrite(dataset, {name: [value, *values[1:]]}, honest=True)
+    problems = failures(verify_dataset(dataset))
+    assert "part hashes" not in problems and "digest" not in problems
+    assert re.search(message, problems[check]), problems
+
+
+def test_a_matrix_off_by_more_than_1e_12(dataset):
+    values = read_part(dataset / PART)["rotation"].to_pylist()
+    values[0][4] += 2e-12
+    rewrite(dataset, {"rotation": values}, honest=True)
+    assert set(failures(verify_dataset(dataset))) == {"rotation"}
+
+
+def test_doubled_rows(dataset):
+    shutil.copy(dataset / PART, dataset / "data/train/part-copy.parquet")
+    assert failures(verify_dataset(dataset)) == {
+        "part files": "data/train/part-copy.parquet is not listed in the manifest"
+    }
+    manifest = read_manifest(dataset)
+    copy = check_part(dataset / "data/train/part-copy.parquet")
+    write_manifest(replace(manifest, parts=(*manifest.parts, copy)), dataset)
+    problems = failures(verify_dataset(dataset))
+    assert set(problems) == {"every row once"}
+    assert "y-30_p-20_r+0 is there more than once" in problems["every row once"]
+
+
+def test_leftovers_of_a_killed_build(dataset):
+    (dataset / "data/train/.part-s9.tmp").write_bytes(b"PAR1")
+    assert failures(verify_dataset(dataset)) == {
+        "part files": "data/train/.part-s9.tmp is not listed in the manifest"
+    }
+
+
+def test_images_removed_or_replaced(dataset):
+    pictures = sorted((dataset / "images/s1/neutral").iterdir())
+    pictures[0].unlink()
+    pictures[1].write_bytes(pictures[2].read_bytes())
+    problems = failures(verify_dataset(dataset))
+    assert set(problems) == {"images"}
+    assert f"{pictures[0].name}: No such file" in problems["images"]
+    assert f"{pictures[1].name}: the image is not the one that was rendered" in problems["images"]
+
+
+def test_an_embedded_image_replaced(build, tmp_path):
+    build(tmp_path / "d", "embedded")
+    images = read_part(tmp_path / "d" / PART)["image"].to_pylist()
+    rewrite(tmp_path / "d", {"image": [images[1], *images[1:]]}, honest=True)
+    problems = failures(verify_dataset(tmp_path / "d"))
+    assert set(problems) == {"images"} and "y-30_p-20_r+0: the image is not" in problems["images"]
+
+
+@pytest.mark.parametrize("value", [None, {"bytes": None, "path": "x.png"}])
+def test_nulls_in_the_only_nullable_column(build, tmp_path, value):
+    build(tmp_path / "d", "embedded")
+    images = read_part(tmp_path / "d" / PART)["image"].to_pylist()
+    rewrite(tmp_path / "d", {"image": [value, *images[1:]]}, honest=True)
+    assert failures(verify_dataset(tmp_path / "d"))["no nulls"] == f"{PART}: nulls in image"
+
+
+def test_another_schema(dataset):
+    table = read_part(dataset / PART)
+    pq.write_table(table.drop_columns(["quaternion"]), dataset / PART)
+    problems = failures(verify_dataset(dataset))
+    assert problems["schema"] == f"{PART}: columns differ from schema 1.0.0: quaternion"
+    metadata = {**table.schema.metadata, b"headturn.configuration_digest": b"0"}
+    pq.write_table(table.replace_schema_metadata(metadata), dataset / PART)
+    assert "headturn.configuration_digest is '0', expected" in failures(verify_dataset(dataset))["schema"]
+
+
+@pytest.mark.parametrize(
+    ("file", "check", "message"),
+    [
+        ("manifest.json", "manifest", "not a Headturn dataset, or its build did not finish"),
+        ("heads.parquet", "heads and poses", "heads.parquet: cannot be read"),
+        ("poses.csv", "heads and poses", "poses.csv: cannot be read"),
+    ],
+)
+def test_a_missing_side_file(dataset, file, check, message):
+    (dataset / file).unlink()
+    report = verify_dataset(dataset)
+    problems = failures(report)
+    assert message in problems[check] and not report.ok
+    assert problems["images"] == "not checked, because of the problems above"
+
+
+def test_a_missing_head_or_pose(dataset):
+    write_heads(read_heads(dataset)[:1], dataset)
+    write_manifest(read_manifest(dataset), dataset)
+    problems = failures(verify_dataset(dataset))
+    assert problems["heads and poses"] == "heads.parquet has 1 heads, the manifest says 2"
+    assert "s2/neutral/y-30_p-20_r+0 is not in heads.parquet" in problems["every row once"]
+
+
+def test_a_changed_side_table(dataset):
+    first, second = read_heads(dataset)
+    write_heads([first, replace(second, attribution="Somebody else")], dataset)
+    assert failures(verify_dataset(dataset)) == {
+        "heads and poses": "heads.parquet was changed after the build (SHA-256 differs)"
+    }
+
+
+def test_not_a_dataset(tmp_path):
+    report = verify_dataset(tmp_path / "nowhere")
+    assert not report.ok and "run `headturn build` again" in report.text()
