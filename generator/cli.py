@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from generator import __version__
+from generator import __version__, option_values
+from generator.cli_heads import heads_app
+from generator.console import EXIT_INCOMPLETE, JsonFlag, err, out
 from generator.errors import HeadturnError, UsageError
+from generator.option_values import given, numbers, pose_source
 from generator.reporter import JsonReporter, TerminalReporter
-
-EXIT_INCOMPLETE = 3
 
 app = typer.Typer(
     help="3D heads in, Parquet with exact head pose out.",
@@ -31,11 +30,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-heads_app = typer.Typer(help="Make parametric heads, or look at a head source.", no_args_is_help=True)
 app.add_typer(heads_app, name="heads")
-
-out = Console()
-err = Console(stderr=True)
 
 
 class Preset(str, Enum):
@@ -52,11 +47,13 @@ class ExecutorName(str, Enum):
     local = "local"
 
 
-JsonFlag = Annotated[bool, typer.Option("--json", help="JSON on stdout, for machines.")]
 BlenderOption = Annotated[
-    str | None, typer.Option("--blender", help="A Blender executable (4.2 or newer) instead of the bpy wheel.")
+    str | None,
+    typer.Option("--blender", help="A Blender executable (4.2 or newer) instead of the bpy wheel."),
 ]
-UnitsOption = Annotated[str | None, typer.Option(help="Unit of the meshes: um, mm, cm, dm or m. Guessed if absent.")]
+UnitsOption = Annotated[
+    str | None, typer.Option(help="Unit of the meshes: um, mm, cm, dm or m. Guessed if absent.")
+]
 UpOption = Annotated[str | None, typer.Option(help="Axis of the crown, such as +Y. Guessed if absent.")]
 ForwardOption = Annotated[str | None, typer.Option(help="Axis of the nose, such as +Z. Guessed if absent.")]
 
@@ -76,64 +73,6 @@ def _main(
     """3D heads in, Parquet with exact head pose out."""
 
 
-@heads_app.command("make", epilog="Example: headturn heads make --count 24 --seed 7 --expressions 3 --out heads")
-def heads_make(
-    folder: Annotated[Path, typer.Option("--out", help="Folder for the heads; must be new or empty.")],
-    count: Annotated[int, typer.Option(help="How many identities.")] = 24,
-    seed: Annotated[int, typer.Option(help="Same seed, same bytes.")] = 0,
-    expressions: Annotated[int, typer.Option(help="Sampled expressions each, besides the neutral face.")] = 0,
-) -> None:
-    """Compose parametric heads from MakeHuman's CC0 data, as OBJ folders."""
-    from generator.heads.parametric.make import make_heads
-
-    with TerminalReporter(err) as reporter:
-        reporter.stage("making heads", count)
-        made = make_heads(
-            folder, count=count, seed=seed, expressions=expressions, progress=lambda _: reporter.advance()
-        )
-    out.print(f"{len(made)} heads in {folder}; build with: headturn build --heads {folder} --out dataset")
-
-
-@heads_app.command("list", epilog="Example: headturn heads list /data/facescape")
-def heads_list(
-    path: Annotated[Path, typer.Argument(help="A FaceScape download, a folder of meshes, or one mesh.")],
-    shallow: Annotated[bool, typer.Option("--shallow", help="Look at names only; do not read the meshes.")] = False,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show what a head source holds: subjects, expressions, vertices, texture, licence, problems."""
-    from generator.heads.describe import describe_source
-    from generator.heads.source import find_heads
-
-    source = find_heads(path)
-    rows = describe_source(source, deep=not shallow)
-    if as_json:
-        typer.echo(json.dumps({"path": str(path), "kind": source.kind, "heads": rows}, indent=1))
-    else:
-        _print_heads(source.kind, path, rows)
-    if any(row.get("skipped") for row in rows):
-        raise typer.Exit(EXIT_INCOMPLETE)
-
-
-def _print_heads(kind: str, path: Path, rows: list[dict[str, Any]]) -> None:
-    table = Table(title=f"{path}: {kind}, {len(rows)} heads", box=None, pad_edge=False, title_justify="left")
-    columns = [c for c in (rows[0] if rows else {}) if c not in ("source", "skipped")]
-    for column in columns:
-        table.add_column(column)
-    for row in rows:
-        table.add_row(*(_cell(row.get(c)) for c in columns), style="dim" if row.get("skipped") else None)
-    out.print(table)
-
-
-def _cell(value: object) -> str:
-    if value is None or value == []:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, (list, tuple)):
-        return "; ".join(map(str, value))
-    return str(value)
-
-
 @app.command(epilog="Example: headturn build --heads my_heads --yaw -50,50,10 --preset quality --out dataset")
 def build(
     config_file: Annotated[
@@ -147,8 +86,12 @@ def build(
     seed: Annotated[int | None, typer.Option(help="Seed of heads and random poses.")] = None,
     subject: Annotated[list[str] | None, typer.Option(help="Only this subject; repeatable.")] = None,
     expression: Annotated[list[str] | None, typer.Option(help="Only this expression; repeatable.")] = None,
-    sampled_expressions: Annotated[int | None, typer.Option(help="Sampled expressions a parametric head.")] = None,
-    license_: Annotated[str | None, typer.Option("--license", help="Licence of heads that do not say.")] = None,
+    sampled_expressions: Annotated[
+        int | None, typer.Option(help="Sampled expressions a parametric head.")
+    ] = None,
+    license_: Annotated[
+        str | None, typer.Option("--license", help="Licence of heads that do not say.")
+    ] = None,
     redistributable: Annotated[
         bool | None, typer.Option("--redistributable/--not-redistributable", help="May renders be published?")
     ] = None,
@@ -159,7 +102,9 @@ def build(
     yaw: Annotated[str | None, typer.Option(help="START,STOP,STEP of the grid, or LOW,HIGH.")] = None,
     pitch: Annotated[str | None, typer.Option(help="As --yaw.")] = None,
     roll: Annotated[str | None, typer.Option(help="As --yaw.")] = None,
-    preset: Annotated[Preset | None, typer.Option(help="fast: no noise, quick. quality: path traced.")] = None,
+    preset: Annotated[
+        Preset | None, typer.Option(help="fast: no noise, quick. quality: path traced.")
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="Cycles samples a pixel.")] = None,
     resolution: Annotated[int | None, typer.Option(help="Image side in pixels.")] = None,
     lens: Annotated[float | None, typer.Option(help="Focal length in mm on a 36 mm sensor.")] = None,
@@ -172,7 +117,9 @@ def build(
     image_format: Annotated[str | None, typer.Option(help="png or jpg.")] = None,
     validation: Annotated[float | None, typer.Option(help="Share of subjects for validation, 0-1.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Lanes; default one a core.")] = None,
-    executor: Annotated[ExecutorName, typer.Option(help="local, or serial for debugging.")] = ExecutorName.local,
+    executor: Annotated[
+        ExecutorName, typer.Option(help="local, or serial for debugging.")
+    ] = ExecutorName.local,
     blender: BlenderOption = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -180,11 +127,12 @@ def build(
 
     Run it again to continue a build that was interrupted.
     """
+    from generator.dataset.manifest import portable_command
     from generator.execution.build import build as run_build
     from generator.execution.open_executor import open_executor
     from generator.plan.config import load_config
 
-    overrides = _overrides(
+    overrides = given(
         heads={
             "source": heads,
             "count": count,
@@ -199,11 +147,11 @@ def build(
             "forward": forward,
         },
         poses={
-            **_poses(poses),
+            **pose_source(poses),
             "seed": seed,
-            "yaw": _numbers("--yaw", yaw),
-            "pitch": _numbers("--pitch", pitch),
-            "roll": _numbers("--roll", roll),
+            "yaw": numbers("--yaw", yaw),
+            "pitch": numbers("--pitch", pitch),
+            "roll": numbers("--roll", roll),
         },
         render={
             "preset": preset.value if preset else None,
@@ -211,8 +159,8 @@ def build(
             "resolution": resolution,
             "lens_mm": lens,
             "distance_mm": distance,
-            **_light(light),
-            "background": _numbers("--background", background),
+            **option_values.light(light),
+            "background": numbers("--background", background),
         },
         dataset={"images": images, "image_format": image_format, "validation": validation},
     )
@@ -223,7 +171,9 @@ def build(
         executor.value, workers=workers, blender=blender, min_confidence=config.landmarks.min_confidence
     )
     with reporter, opened as lanes:
-        result = run_build(config, folder, lanes, reporter, command=" ".join(_command_line()))
+        result = run_build(
+            config, folder, lanes, reporter, command=portable_command(["headturn", *sys.argv[1:]])
+        )
     _print_result(result, time.monotonic() - start, as_json)
     if not result.complete:
         raise typer.Exit(EXIT_INCOMPLETE)
@@ -263,64 +213,22 @@ def preview(
     from generator.execution.preview import render_preview
     from generator.plan.config import load_config
 
-    angles = _numbers("--pose", pose) or []
+    angles = numbers("--pose", pose) or []
     if len(angles) != 3:
         raise UsageError(f"--pose {pose!r}: expected YAW,PITCH,ROLL in degrees, such as 30,10,0")
-    overrides = _overrides(
+    overrides = given(
         heads={"source": str(head), "units": units, "up": up, "forward": forward},
         render={"preset": preset.value, "resolution": resolution, "lens_mm": lens, "samples": samples},
     )
     found = render_preview(
         load_config(None, overrides),
-        tuple(angles),
+        (angles[0], angles[1], angles[2]),
         picture,
         expression=expression,
         draw_landmarks=landmarks,
         blender=blender,
     )
     out.print(f"{picture}: {found}", highlight=False, soft_wrap=True)
-
-
-def _overrides(**sections: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Only what was given on the command line."""
-    return {name: {k: v for k, v in values.items() if v is not None} for name, values in sections.items()}
-
-
-def _numbers(option: str, text: str | None) -> list[float] | None:
-    if text is None:
-        return None
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError as error:
-        raise UsageError(f"{option} {text!r}: expected numbers separated by commas") from error
-
-
-def _poses(text: str | None) -> dict[str, Any]:
-    if text is None:
-        return {}
-    kind, _, count = text.partition(":")
-    if kind == "grid" and not count:
-        return {"kind": "grid"}
-    if kind in ("uniform", "sobol"):
-        if not count.isdigit():
-            raise UsageError(f"--poses {text!r}: say how many, such as {kind}:500")
-        return {"kind": kind, "count": int(count)}
-    return {"kind": "csv", "path": text}
-
-
-def _light(text: str | None) -> dict[str, float]:
-    numbers = _numbers("--light", text)
-    if numbers is None:
-        return {}
-    if len(numbers) != 2:
-        raise UsageError(f"--light {text!r}: expected YAW,PITCH in degrees, such as 25,35")
-    return {"light_yaw_deg": numbers[0], "light_pitch_deg": numbers[1]}
-
-
-def _command_line() -> Iterator[str]:
-    from generator.dataset.manifest import portable_command
-
-    yield portable_command(["headturn", *sys.argv[1:]])
 
 
 def _print_result(result: Any, seconds: float, as_json: bool) -> None:

@@ -200,8 +200,8 @@ def prepare_heads(
     for head in source.heads:
         subjects[head.subject].append(head)
     skipped = list(source.skipped)
-    for head in skipped:
-        reporter.note(f"skipped {head.subject}/{head.expression}: {head.reason}")
+    for missing in skipped:
+        reporter.note(f"skipped {missing.subject}/{missing.expression}: {missing.reason}")
 
     orders = []
     for heads in subjects.values():
@@ -232,6 +232,7 @@ def prepare_heads(
                     triangles=fact["triangles"],
                     split=assign_split(head.subject, config.dataset.validation),
                     distance_mm=camera_distance(config, prepared),
+                    problems=tuple(fact["problems"]),
                 )
             )
         if receipt:
@@ -284,7 +285,9 @@ def run_units(
                 "reason": outcome.error,
             }
             failures.append(failure)
-            reporter.note(f"unit {failure['unit']} of {head['subject']}/{head['expression']}: {outcome.error}")
+            reporter.note(
+                f"unit {failure['unit']} of {head['subject']}/{head['expression']}: {outcome.error}"
+            )
             continue
         parts.append(PartInfo(**outcome.receipt["part"]))
         for stage, spent in outcome.receipt["seconds"].items():
@@ -331,7 +334,7 @@ def _head_row(planned: PlannedHead, source: HeadSource, config: BuildConfig) -> 
         vertices=planned.vertices,
         triangles=planned.triangles,
         split=planned.split,
-        problems=(*head.problems, *prepared.notes),
+        problems=(*head.problems, *planned.problems, *prepared.notes),
     )
 
 

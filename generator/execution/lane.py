@@ -106,10 +106,7 @@ class Lane:
         folder = self._scratch / "head"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        return read_mesh(head, folder, import_with_blender=self._import_with_blender)
-
-    def _import_with_blender(self, source: Path, folder: Path) -> Path:
-        return self._renderer.convert(source, folder / f"{source.stem}.glb")
+        return read_mesh(head, folder, import_with_blender=self._renderer.import_mesh)
 
     def _prepare(self, heads: list[Head]) -> dict[str, Any]:
         """Check every expression of a subject; find the face on the first that shows it."""
@@ -126,7 +123,13 @@ class Lane:
                 reason = reason or str(error)
                 facts.append({"error": str(error)})
             else:
-                facts.append({"vertices": len(mesh.vertices), "triangles": len(mesh.triangles)})
+                facts.append(
+                    {
+                        "vertices": len(mesh.vertices),
+                        "triangles": len(mesh.triangles),
+                        "problems": list(mesh.problems),
+                    }
+                )
         if prepared is None:
             raise HeadError(reason)
         return {"prepared": prepared.as_dict(), "facts": facts, "versions": self.versions}

@@ -64,7 +64,9 @@ class LineProcess:
         try:
             return json.loads(line)
         except json.JSONDecodeError as error:
-            raise WorkerError(f"{self._name} answered with something that is not JSON: {line[:80]!r}") from error
+            raise WorkerError(
+                f"{self._name} answered with something that is not JSON: {line[:80]!r}"
+            ) from error
 
     def close(self, timeout: float = 5.0) -> None:
         """Close the child's stdin, wait for its end, kill it if it does not come."""

@@ -86,9 +86,7 @@ class Prepared:
         return cls(**{**values, "pivot": tuple(values["pivot"]), "notes": tuple(values["notes"])})
 
 
-def prepare(
-    head: Head, mesh: HeadMesh, renderer: Renderer, detector: Detector, scratch: Path
-) -> Prepared:
+def prepare(head: Head, mesh: HeadMesh, renderer: Renderer, detector: Detector, scratch: Path) -> Prepared:
     """Find the face of one head; see the module's docstring.
 
     Raises HeadError if no face is found from the front, or its size fits no unit.
@@ -159,7 +157,7 @@ def _find_face(mesh: HeadMesh, renderer: Renderer, detector: Detector, scratch: 
         if coarse is None:
             continue
         eyes = (coarse.left_eye + coarse.right_eye) / 2
-        width = np.linalg.norm(coarse.left_eye - coarse.right_eye)
+        width = float(np.linalg.norm(coarse.left_eye - coarse.right_eye))
         sharp = _look(mesh, eyes, _FACE_WINDOW * width, renderer, detector, scratch)
         return sharp if sharp is not None else coarse
     return None

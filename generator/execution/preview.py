@@ -63,11 +63,7 @@ def render_preview(
         renderer = Renderer(scratch, scratch / "render.log", blender=blender)
         detector = MediaPipeFaceMesh(config.landmarks.min_confidence)
         try:
-            mesh = read_mesh(
-                head,
-                scratch,
-                import_with_blender=lambda fbx, folder: renderer.convert(fbx, folder / f"{fbx.stem}.glb"),
-            )
+            mesh = read_mesh(head, scratch, import_with_blender=renderer.import_mesh)
             prepared = prepare(head, mesh, renderer, detector, scratch)
             package = scratch / "head.npz"
             save_package(prepared.normalise(mesh), package)
@@ -81,7 +77,7 @@ def render_preview(
         radius = max(1, round(settings.resolution / 300))
         for x, y in found[:, :2]:
             cv2.circle(image, (round(x), round(y)), radius, DOT, -1, cv2.LINE_AA)
-    ok, encoded = cv2.imencode(picture.suffix, image)
+    _, encoded = cv2.imencode(picture.suffix, image)
     try:
         picture.write_bytes(encoded.tobytes())
     except OSError as error:

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 from generator.errors import HeadError, UsageError, WorkerError
 from generator.execution.lines import LineProcess
+from generator.execution.scratch import scratch_folder
 from generator.plan.render_settings import RenderSettings
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -23,13 +25,16 @@ def worker_command(blender: str | None, threads: int) -> list[str]:
     """
     if blender is not None:
         if not os.access(blender, os.X_OK):
-            raise UsageError(f"{blender}: not an executable Blender; give the path of one, or leave --blender out")
+            raise UsageError(
+                f"{blender}: not an executable Blender; give the path of one, or leave --blender out"
+            )
         script = str(_PACKAGE / "blender" / "worker.py")
         flags = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", script]
         return [blender, *flags, "--", str(threads)]
     if find_spec("bpy") is None:
         raise UsageError(
-            "bpy is not installed: pip install 'headturn[build]' with Python 3.11, or name a Blender with --blender"
+            "bpy is not installed: pip install 'headturn[build]' with Python 3.11, "
+            "or name a Blender with --blender"
         )
     return [sys.executable, "-m", "generator.blender.worker", str(threads)]
 
@@ -90,8 +95,9 @@ class Renderer:
             if "path" in receipt:
                 yield Path(receipt["path"])
 
-    def convert(self, source: Path, target: Path) -> Path:
-        """Have Blender read an FBX file and write it as GLB to target."""
+    def import_mesh(self, source: Path, folder: Path) -> Path:
+        """Have Blender read an FBX file and write it into folder as GLB, whose path is returned."""
+        target = folder / f"{source.stem}.glb"
         self._process.send({"op": "convert", "source": str(source), "target": str(target)})
         for _ in self._receipts():
             pass
@@ -113,3 +119,20 @@ class Renderer:
             yield receipt
             if "done" in receipt:
                 return
+
+
+@contextmanager
+def mesh_importer(blender: str | None = None) -> Iterator[Callable[[Path, Path], Path]]:
+    """:meth:`Renderer.import_mesh` of a worker that starts only if a mesh needs it."""
+    with ExitStack() as stack:
+        worker: Renderer | None = None
+
+        def import_mesh(source: Path, folder: Path) -> Path:
+            nonlocal worker
+            if worker is None:
+                scratch = stack.enter_context(scratch_folder())
+                worker = Renderer(scratch, scratch / "render.log", blender=blender)
+                stack.callback(worker.close)
+            return worker.import_mesh(source, folder)
+
+        yield import_mesh

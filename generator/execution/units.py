@@ -29,6 +29,7 @@ class PlannedHead:
     triangles: int
     split: str
     distance_mm: float
+    problems: tuple[str, ...] = ()
 
 
 def assign_split(subject: str, validation: float) -> str:

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every command shares: the two output streams, --json, and an exit code."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+EXIT_INCOMPLETE = 3
+"""Finished, but something was left out."""
+
+# A pipe has no width of its own; 80 columns would cut every table.
+out = Console(width=None if sys.stdout.isatty() else 160)
+err = Console(stderr=True)
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="JSON on stdout, for machines.")]

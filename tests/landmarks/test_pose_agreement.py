@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The detector, asked independently, sees the pose that the labels claim."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from placed_head import PlacedHead
+from scipy.spatial.transform import Rotation
+
+from generator.execution.prepare import prepare
+from generator.execution.renderer import Renderer
+from generator.geometry.camera import framing_distance
+from generator.geometry.rotation import geodesic_deg, rotation_from_angles
+from generator.heads.mesh import HeadMesh
+from generator.heads.package import save_package
+from generator.heads.read import read_mesh
+from generator.heads.source import find_heads
+from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
+from generator.landmarks.reference_face import fit_pose, reference_face
+from generator.plan.render_settings import RenderSettings
+
+POSES = np.array(
+    [
+        [0, 0, 0],
+        [30, 0, 0],
+        [-30, 0, 0],
+        [0, 25, 0],
+        [0, -20, 0],
+        [0, 0, 30],
+        [0, 0, -30],
+        [25, 15, 20],
+        [-25, -10, -20],
+    ],
+    dtype=float,
+)
+LOOK = RenderSettings(resolution=256, lens_mm=135.0, samples=2)
+
+
+def disagreement(
+    mesh: HeadMesh, radius_mm: float, renderer: Renderer, detector: MediaPipeFaceMesh, folder: Path
+) -> np.ndarray:
+    """Geodesic degrees between label and detector, the head's one constant offset taken out."""
+    package = folder / "head.npz"
+    save_package(mesh, package)
+    distance = framing_distance(radius_mm, LOOK.lens_mm, LOOK.margin)
+    labels, seen = [], []
+    for pose, path in zip(POSES, renderer.render(package, LOOK, distance, POSES.tolist()), strict=True):
+        found = detector.detect(cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+        assert found is not None, f"no face at {pose}"
+        labels.append(rotation_from_angles(pose))
+        seen.append(fit_pose(found).rotation)
+    r_c, fitted = np.stack(labels), np.stack(seen)
+    offset = Rotation.from_matrix(np.swapaxes(r_c, 1, 2) @ fitted).mean().as_matrix()
+    return geodesic_deg(r_c @ offset, fitted)
+
+
+def test_on_a_parametric_head(
+    placed_head: PlacedHead, renderer: Renderer, detector: MediaPipeFaceMesh, tmp_path: Path
+) -> None:
+    error = disagreement(placed_head.mesh, placed_head.prepared.radius_mm, renderer, detector, tmp_path)
+    assert np.median(error) < 5
+    assert error.max() < 10
+
+
+@pytest.mark.parametrize("name", ["lee_perry_smith_obj", "makehuman_asian_young_f"])
+def test_on_real_heads(
+    name: str, shared_heads: Path, renderer: Renderer, detector: MediaPipeFaceMesh, tmp_path: Path
+) -> None:
+    [head] = find_heads(shared_heads / name).heads
+    mesh = read_mesh(head, tmp_path)
+    prepared = prepare(head, mesh, renderer, detector, tmp_path)
+    error = disagreement(prepared.normalise(mesh), prepared.radius_mm, renderer, detector, tmp_path)
+    assert np.median(error) < 5
+    assert error.max() < 10
+
+
+def test_landmarks_are_isotropic_pixels(
+    placed_head: PlacedHead, renderer: Renderer, detector, tmp_path
+) -> None:
+    """x and y lie on the face in the image, z shrinks towards the camera at the nose."""
+    package = tmp_path / "head.npz"
+    save_package(placed_head.mesh, package)
+    distance = framing_distance(placed_head.prepared.radius_mm, LOOK.lens_mm, LOOK.margin)
+    [path] = renderer.render(package, LOOK, distance, [[0, 0, 0]])
+    found = detector.detect(cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+    assert found.shape == (468, 3)
+    assert found.dtype == np.float32
+    assert 60 < found[:, :2].mean() < 200
+    assert found[1, 2] == found[:, 2].min() or found[4, 2] == found[:, 2].min(), "the nose tip is nearest"
+
+
+def test_an_image_without_a_face_is_none(detector: MediaPipeFaceMesh) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (128, 128, 3), dtype=np.uint8)
+    assert detector.detect(noise) is None
+
+
+def test_the_reference_face_is_symmetric_and_faces_the_viewer() -> None:
+    face = reference_face()
+    assert np.abs(face[33] * [-1, 1, 1] - face[263]).max() < 0.05
+    assert face[1, 2] > face[:, 2].mean() + 20, "the nose points to +z"
+    assert face[152, 1] < face[10, 1], "the chin is below the forehead"

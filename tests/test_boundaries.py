@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layout's promises: who may import whom, licences, module size."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted([*ROOT.glob("generator/**/*.py"), *ROOT.glob("downstream_hpe/**/*.py")])
+
+# Each layer may import itself and the layers after it in its own row.
+MAY_IMPORT = {
+    "geometry": set(),
+    "plan": {"geometry"},
+    "heads": {"geometry"},
+    "blender": {"plan", "heads", "geometry"},
+    "landmarks": {"plan", "heads", "geometry"},
+    "dataset": {"plan", "heads", "geometry"},
+    "execution": {"blender", "landmarks", "dataset", "plan", "heads", "geometry"},
+}
+
+
+def imports(path: Path) -> set[str]:
+    """Every module a file imports, also inside functions."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def identifier(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=identifier)
+def test_module(path: Path) -> None:
+    parts = path.relative_to(ROOT).parts
+    tops = {name.split(".")[0] for name in imports(path)}
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= 350, "split it"
+    if parts[0] == "downstream_hpe":
+        assert text.startswith("# SPDX-License-Identifier: MIT\n")
+        assert not tops & {"generator", "bpy"}
+        return
+    assert text.startswith("# SPDX-License-Identifier: GPL-3.0-or-later\n")
+    assert "downstream_hpe" not in tops
+    layer = parts[1] if len(parts) > 2 else None
+    if layer != "blender":
+        assert not tops & {"bpy", "mathutils"}, "only generator/blender may import bpy"
+    if layer is not None:
+        used = {n.split(".")[1] for n in imports(path) if n.startswith("generator.") and "." in n}
+        assert used & set(MAY_IMPORT) <= MAY_IMPORT[layer] | {layer}
+
+
+def test_the_render_worker_needs_numpy_and_the_standard_library_alone() -> None:
+    """Whatever the worker imports, directly or not, runs inside any Blender."""
+    import sys
+
+    allowed = {"numpy", "bpy", "mathutils", "generator", *sys.stdlib_module_names}
+    seen, todo = set(), ["generator.blender.worker"]
+    while todo:
+        name = todo.pop()
+        path = ROOT / (name.replace(".", "/") + ".py")
+        package = ROOT / name.replace(".", "/") / "__init__.py"
+        for file in (path, package):
+            if file in seen or not file.exists():
+                continue
+            seen.add(file)
+            for module in imports(file):
+                assert module.split(".")[0] in allowed, f"{file} imports {module}"
+                pieces = module.split(".")
+                todo += [".".join(pieces[: k + 1]) for k in range(len(pieces)) if pieces[0] == "generator"]
+    assert len(seen) > 8

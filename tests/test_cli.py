@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line as people meet it: every mistake is one clear line and the right exit code."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from generator import cli
+
+
+def headturn(*arguments: str | Path, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Run the command in this process; its exit code."""
+    monkeypatch.setattr(sys, "argv", ["headturn", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    return stopped.value.code or 0
+
+
+COMMANDS = [[], ["heads"], ["heads", "make"], ["heads", "list"], ["build"], ["verify"], ["preview"]]
+
+
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ([], ["heads"])], ids=" ".join)
+def test_every_command_has_help_with_an_example(
+    command: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    assert headturn(*command, "--help", monkeypatch=monkeypatch) == 0
+    assert f"Example: headturn {' '.join(command)}" in re.sub(r"\s+", " ", capsys.readouterr().out)
+
+
+BAD = {
+    "missing configuration": (
+        ["build", "nowhere.toml"],
+        2,
+        "nowhere.toml: there is no such configuration file",
+    ),
+    "missing heads": (["build", "--heads", "nowhere"], 2, "nowhere"),
+    "empty heads": (["build", "--heads", "empty"], 2, "empty"),
+    "step does not divide": (["build", "--yaw=-50,50,30"], 2, "yaw"),
+    "negative step": (["build", "--pitch=-40,40,-10"], 2, "pitch"),
+    "not a number": (["build", "--yaw=a,b,c"], 2, "--yaw 'a,b,c'"),
+    "two numbers for a grid": (["build", "--yaw=-50,50"], 2, "poses.yaw"),
+    "unknown images": (["build", "--images", "tape"], 2, "dataset.images"),
+    "resolution": (["build", "--resolution", "4"], 2, "render.resolution"),
+    "sobol without a count": (["build", "--poses", "sobol"], 2, "sobol:500"),
+    "missing pose file": (["build", "--poses", "poses.csv"], 2, "poses.csv"),
+    "no such blender": (["build", "--blender", "/nowhere/blender"], 2, "/nowhere/blender"),
+    "preview a pose of two": (["preview", "empty", "--pose", "1,2"], 2, "--pose '1,2'"),
+    "preview to a text file": (["preview", "empty", "--out", "a.txt"], 2, "a.txt"),
+    "list nothing": (["heads", "list", "nowhere"], 2, "nowhere"),
+    "make none": (["heads", "make", "--count", "0", "--out", "h"], 2, "0"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "code", "says"), BAD.values(), ids=BAD.keys())
+def test_bad_input_is_one_line(
+    arguments: list[str],
+    code: int,
+    says: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    if arguments[0] == "build":
+        arguments = [*arguments, "--out", "dataset"]
+    assert headturn(*arguments, monkeypatch=monkeypatch) == code
+    printed = capsys.readouterr()
+    lines = [line for line in printed.err.splitlines() if line.startswith("headturn: ")]
+    assert len(lines) == 1, printed.err
+    assert says in lines[0]
+    assert "Traceback" not in printed.err
+    assert not (tmp_path / "dataset" / "manifest.json").exists()
+
+
+def test_verify_of_nothing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    assert headturn("verify", "nowhere", monkeypatch=monkeypatch) == 1
+    failed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("FAIL")]
+    assert len(failed) == 1
+    assert "nowhere" in failed[0]
+
+
+@pytest.mark.parametrize(
+    "text", ["[render\n", "[render]\nresolution = 'big'\n", "[rendering]\nx = 1\n", "heads = 3\n"]
+)
+def test_bad_configuration_names_the_file(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    file = tmp_path / "c.toml"
+    file.write_text(text)
+    assert headturn("build", file, "--out", tmp_path / "d", monkeypatch=monkeypatch) == 2
+    assert str(file) in capsys.readouterr().err
+
+
+def test_build_from_toml_and_flags_as_a_person_would(parametric_heads: Path, tmp_path: Path) -> None:
+    """The console entry point in a process of its own, JSON events, verify, and a second run."""
+    (tmp_path / "c.toml").write_text(
+        f'[heads]\nsource = "{parametric_heads}"\nsubjects = ["s1p0001"]\n'
+        "[poses]\nyaw = [-20, 20, 20]\npitch = [0, 0, 1]\nroll = [0, 0, 1]\n[render]\nresolution = 256\n"
+    )
+    command = [sys.executable, "-m", "generator.cli"]
+    build = [*command, "build", "c.toml", "--resolution", "80", "--out", "d", "--json"]
+    done = subprocess.run(build, cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    events = [json.loads(line) for line in done.stdout.splitlines()]
+    assert events[-1]["event"] == "finished"
+    assert events[-1]["rows"] == 3
+    assert "resolution = 80" in (tmp_path / "d" / "config.toml").read_text()
+    verify = subprocess.run([*command, "verify", "d", "--json"], cwd=tmp_path, capture_output=True, text=True)
+    assert verify.returncode == 0, verify.stdout
+    again = subprocess.run(build, cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    assert json.loads(again.stdout.splitlines()[-1])["digest"] == events[-1]["digest"]
+
+
+def test_preview_writes_one_picture(
+    parametric_heads: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    picture = tmp_path / "p.png"
+    head = parametric_heads / "s1p0000"
+    options = ["--pose", "30,10,0", "--preset", "fast", "--resolution", "128", "--out", picture]
+    assert headturn("preview", head, *options, monkeypatch=monkeypatch) == 0
+    assert "landmarks found" in capsys.readouterr().out
+    assert picture.stat().st_size > 3000
+    several = headturn("preview", parametric_heads, "--out", picture, monkeypatch=monkeypatch)
+    assert several == 2
+    assert "2 subjects" in capsys.readouterr().err
