@@ -39,6 +39,7 @@ def _import_package_beside_this_file() -> None:
     spec = importlib.util.spec_from_file_location(
         "generator", folder / "__init__.py", submodule_search_locations=[str(folder)]
     )
+    assert spec is not None and spec.loader is not None, "a file that exists has a loader"
     package = importlib.util.module_from_spec(spec)
     sys.modules["generator"] = package
     spec.loader.exec_module(package)

@@ -105,7 +105,7 @@ def build(
     manifest = Manifest(
         versions=versions,
         configuration=config.as_dict(),
-        parts=tuple(done + parts),
+        parts=tuple(sorted(done + parts, key=lambda part: part.path)),
         images=config.dataset.images,
         heads=len(planned),
         skipped=tuple({"head": f"{s.subject}/{s.expression}", "reason": s.reason} for s in skipped),

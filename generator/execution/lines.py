@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -70,12 +71,7 @@ class LineProcess:
 
     def close(self, timeout: float = 5.0) -> None:
         """Close the child's stdin, wait for its end, kill it if it does not come."""
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                try:
-                    stream.close()
-                except BrokenPipeError:
-                    continue  # the child went first; there is nobody left to tell
+        self._close_pipes()
         try:
             self._process.wait(timeout)
         except subprocess.TimeoutExpired:
@@ -85,6 +81,14 @@ class LineProcess:
         """End the child at once."""
         self._process.kill()
         self._process.wait()
+        self._close_pipes()
+
+    def _close_pipes(self) -> None:
+        for stream in (self._process.stdin, self._process.stdout):
+            # The child may have gone first, with an order of ours still in the pipe.
+            with contextlib.suppress(BrokenPipeError):
+                if stream is not None:
+                    stream.close()
 
     def _ended(self) -> WorkerError:
         code = self._process.wait()
