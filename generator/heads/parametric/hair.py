@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on the scalp: where it grows, how far it lifts the surface, how it is painted."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from generator.heads.parametric.appearance import Appearance, hair_tone
+from generator.heads.parametric.atlas import Atlas, head_atlas, vertex_normals
+from generator.heads.parametric.noise import smooth_noise, smoothstep
+from generator.heads.parametric.template import PARTS, head_template
+
+# The usual hairline on the base mesh: height (dm) against the angle from the face, degrees.
+_ANGLES = np.array([0, 14, 28, 42, 54, 62, 67, 72, 78, 95, 104, 120, 180.0])
+_HEIGHTS = np.array([8.02, 8.01, 7.98, 7.86, 7.70, 7.45, 7.18, 7.22, 7.46, 7.42, 7.02, 6.82, 6.68])
+_RECESSION = np.array([0.15, 0.5, 1.0, 0.9, 0.5, 0.2, 0, 0, 0, 0, 0, 0, 0])
+_FRONT = np.array([1, 1, 0.9, 0.6, 0.3, 0.1, 0, 0, 0, 0, 0, 0, 0])
+_AXIS_Z = 0.35
+
+
+def hair_height(points: np.ndarray, look: Appearance) -> np.ndarray:
+    """Height above the hairline in dm, [...] for canonical points [..., 3]; negative on bare skin."""
+    angle = np.degrees(np.arctan2(np.abs(points[..., 0]), points[..., 2] - _AXIS_Z))
+    heights = _HEIGHTS + (look.hairline - look.fringe) * _FRONT + look.recession * _RECESSION
+    line = np.interp(angle, _ANGLES, heights)
+    height = points[..., 1] - line
+    if look.hair_style == "bald":
+        # What is left is a wreath around the back of the head.
+        return np.minimum(height, 7.62 - points[..., 1] - 0.5 * np.maximum(points[..., 2] - 0.2, 0))
+    return height
+
+
+def strand_noise(rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
+    """Streaks that run from the crown down the head, about -1 to 1, [...]."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    around = np.arctan2(x, z - 0.15)
+    along = np.arctan2(np.hypot(x, z - 0.15), y - 7.3)
+    wave = 0.05 * np.sin(6 * along + rng.uniform(0, 6))
+    fine = smooth_noise(rng, ((around + wave) * 38, along * 2.5))
+    coarse = smooth_noise(rng, ((around + wave) * 12, along * 1.5))
+    return 0.6 * fine + 0.4 * coarse
+
+
+def hair_volume(vertices: np.ndarray, look: Appearance, rng: np.random.Generator) -> np.ndarray:
+    """Offsets [V, 3], dm, that lift the scalp of a neutral head by its hair."""
+    template = head_template()
+    height = hair_height(template.canonical, look)
+    rise = smoothstep(-0.02, 0.38, height) * smoothstep(0.03, 0.22, _ear_distance())
+    top = 0.55 + 0.45 * smoothstep(7.6, 8.3, template.canonical[:, 1])
+    lumps = 1 + 0.22 * smooth_noise(rng, tuple(template.canonical.T * 3.0 + rng.uniform(0, 8)))
+    skin = template.triangles[template.part == PARTS.index("skin")]
+    normals, _ = vertex_normals(vertices, skin)
+    lift = look.volume_mm / 100 * rise * top * lumps
+    lift[~np.isin(np.arange(len(lift)), skin)] = 0
+    return normals * lift[:, None]
+
+
+@lru_cache(maxsize=1)
+def _ear_distance() -> np.ndarray:
+    """Distance of every vertex to the ears on the base mesh, dm, [V]."""
+    atlas = head_atlas()
+    ears = atlas.points[atlas.ears > 0.5][::7]
+    return cKDTree(ears).query(head_template().canonical)[0]
+
+
+def paint_hair(color: np.ndarray, atlas: Atlas, look: Appearance, rng: np.random.Generator) -> None:
+    """Paint scalp hair into color float32 [H, W, 3], in place."""
+    height = hair_height(atlas.points, look)
+    near = (height > -0.15) & atlas.is_part("skin") & (atlas.ears < 0.5)
+    points, height = atlas.points[near], height[near]
+    strands = strand_noise(rng, points)
+    grain = rng.standard_normal(len(height), dtype=np.float32)
+    soft = 0.025 if look.hair_style in ("bald", "shaved") else 0.015
+    cover = smoothstep(-0.06, 0.05 + soft, height + 0.05 * strands + soft * grain)
+    cover *= {"bald": 0.35, "shaved": 0.72}.get(look.hair_style, 1.0)
+    tone = hair_tone(look)
+    shade = 1 + 0.42 * strands + 0.06 * grain
+    # Highlights on the crown, darkness at the roots.
+    shade *= 0.8 + 0.35 * smoothstep(7.6, 8.3, points[..., 1])
+    hair = tone * shade[:, None] + 0.02 * np.maximum(strands, 0)[:, None]
+    color[near] += (hair - color[near]) * (cover * (1 - 0.9 * atlas.ears[near]))[:, None]

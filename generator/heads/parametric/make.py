@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make folders of parametric heads."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from generator.errors import HeadError, UsageError
+from generator.heads.head import NEUTRAL
+from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
+from generator.heads.parametric.compose import HeadShape, head_shape, head_vertices
+from generator.heads.parametric.curtain import paint_curtain
+from generator.heads.parametric.expression import NEUTRAL_EXPRESSION, Expression, sample_expression
+from generator.heads.parametric.eyes import paint_eye
+from generator.heads.parametric.folder import write_description, write_materials, write_mesh, write_texture
+from generator.heads.parametric.identity import Identity, sample_identity
+from generator.heads.parametric.skin import paint_skin
+from generator.heads.parametric.source import data_folder
+
+LICENSE = "CC0-1.0"
+ATTRIBUTION = (
+    "Made by Headturn from MakeHuman's CC0 base mesh and targets (MakeHuman team) "
+    "and the CC0 face units of Mika Suominen"
+)
+_HEAD_NAME = re.compile(r"s\d+p\d{4,}")
+
+
+def make_heads(
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    expressions: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> list[Path]:
+    """Write heads ``s<seed>p0000`` ... below out and return their folders.
+
+    Head k of a seed is the same whatever count is, and so is expression j of a
+    head whatever expressions is. A folder is complete or absent: each is written
+    beside its place and renamed. Folders that are already there are replaced.
+
+    Parameters
+    ----------
+    out: made if missing; may hold earlier parametric heads and nothing else.
+    count: number of identities, at least 1. seed: 0 or larger.
+    expressions: sampled expressions an identity besides the neutral one.
+    progress: called with the name of every head once it is written.
+
+    Raises
+    ------
+    UsageError: a number is out of range, or out holds something else.
+    HeadError: the data are not installed, or a file cannot be written.
+    """
+    if count < 1:
+        raise UsageError(f"count is {count}: ask for at least 1 head")
+    if seed < 0:
+        raise UsageError(f"seed is {seed}: it must be 0 or larger")
+    if expressions < 0:
+        raise UsageError(f"expressions is {expressions}: it must be 0 or larger")
+    data_folder()
+    _prepare(out)
+    folders = []
+    for index in range(count):
+        folder = out / f"s{seed}p{index:04d}"
+        try:
+            _write_head(folder, seed, index, expressions)
+        except OSError as error:
+            reason = f"cannot be written ({error.strerror}); check space and permissions"
+            raise HeadError(f"{folder}: {reason}") from error
+        folders.append(folder)
+        if progress is not None:
+            progress(folder.name)
+    return folders
+
+
+def sample_head(seed: int, index: int) -> tuple[Identity, Appearance, HeadShape]:
+    """Head ``index`` of a seed: its parameters and its shape."""
+    identity = sample_identity(np.random.default_rng([seed, index, 0]))
+    appearance = sample_appearance(np.random.default_rng([seed, index, 1]), identity)
+    return identity, appearance, head_shape(identity, appearance, np.random.default_rng([seed, index, 2]))
+
+
+def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
+    identity, appearance, shape = sample_head(seed, index)
+    paint = np.random.default_rng([seed, index, 3])
+    work = folder.with_name(f".{folder.name}.tmp")
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir()
+    long_hair = shape.curtain is not None
+    described = {}
+    for number in range(expressions + 1):
+        name, expression = NEUTRAL, NEUTRAL_EXPRESSION
+        if number:
+            name = f"expression_{number:02d}"
+            expression = sample_expression(np.random.default_rng([seed, index, 4, number]))
+        write_mesh(work / f"{name}.obj", head_vertices(shape, expression), long_hair)
+        described[name] = _describe_expression(f"{name}.obj", expression)
+    write_materials(work, np.minimum(hair_tone(appearance) * 0.6, 0.12), long_hair)
+    write_texture(work / "skin.png", paint_skin(appearance, paint))
+    write_texture(work / "eye.png", paint_eye(appearance, paint))
+    if long_hair:
+        write_texture(work / "hair.png", paint_curtain(appearance, paint))
+    write_description(
+        work / "head.json",
+        {
+            "source": "parametric",
+            "subject": folder.name,
+            "license": LICENSE,
+            "redistributable": True,
+            "attribution": ATTRIBUTION,
+            "units": "mm",
+            "up": "+Y",
+            "forward": "+Z",
+            "expressions": described,
+            "parameters": {
+                "seed": seed,
+                "index": index,
+                "scale_mm_per_dm": shape.scale,
+                "identity": asdict(identity),
+                "appearance": asdict(appearance),
+            },
+        },
+    )
+    if folder.exists():
+        shutil.rmtree(folder)
+    work.rename(folder)
+
+
+def _describe_expression(mesh: str, expression: Expression) -> dict:
+    return {"file": mesh} | asdict(expression)
+
+
+def _prepare(out: Path) -> None:
+    """Make out, or check that it holds only heads made here."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        entries = sorted(out.iterdir())
+    except OSError as error:
+        reason = f"not a folder that can be written ({error.strerror}); choose another"
+        raise UsageError(f"{out}: {reason}") from error
+    for entry in entries:
+        name = entry.name.removeprefix(".").removesuffix(".tmp")
+        if not (entry.is_dir() and _HEAD_NAME.fullmatch(name)):
+            raise UsageError(f"{out}: holds {entry.name}, not a parametric head; choose an empty folder")
