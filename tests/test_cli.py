@@ -130,3 +130,19 @@ def test_preview_writes_one_picture(
     several = headturn("preview", parametric_heads, "--out", picture, monkeypatch=monkeypatch)
     assert several == 2
     assert "2 subjects" in capsys.readouterr().err
+
+
+def test_a_build_needs_nothing_but_the_build_extra(parametric_heads: Path, tmp_path: Path) -> None:
+    """Packages of the test tools and of the learning side are hidden; build and verify work."""
+    program = (
+        "import sys; sys.modules.update(dict.fromkeys("
+        "['pandas', 'polars', 'duckdb', 'datasets', 'torch', 'psutil', 'pytest'])); "
+        "from generator.cli import main; main()"
+    )
+    python = [sys.executable, "-c", program]
+    poses = ["--yaw=0,0,1", "--pitch=0,0,1", "--roll=0,0,1", "--resolution", "64", "--executor", "serial"]
+    build = [*python, "build", "--heads", str(parametric_heads), *poses, "--out", "d"]
+    done = subprocess.run(build, cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run([*python, "verify", "d"], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stdout
