@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any, Literal
 
 import tomli_w
-import tomllib
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from generator.errors import UsageError
 from generator.plan.poses import PosePlan, csv_plan, grid_plan, sobol_plan, uniform_plan
 from generator.plan.render_settings import RenderSettings
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 PARAMETRIC = "parametric"
 Axis = Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"]
