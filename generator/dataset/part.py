@@ -23,7 +23,6 @@ from generator.dataset.schema import (
     check_name,
     image_mode,
     image_path,
-    passes_path,
     sample_id,
 )
 from generator.errors import DatasetError
@@ -32,8 +31,6 @@ from generator.geometry.rotation import quaternion_from_rotation, rotation_from_
 from generator.plan.poses import ANGLES, pose_name
 
 NUMPY_TYPES = {pa.float64(): np.float64, pa.float32(): np.float32, pa.bool_(): np.bool_}
-"""Of list elements. (pyarrow's own mapping needs pandas, which a build does not.)"""
-
 ROW_GROUP = 1024
 BATCH = 256
 """Rows read at once: bounds the memory of a check when images are embedded."""
@@ -47,12 +44,7 @@ class UnitRows:
     camera         the camera of every row
     detected       bool [N]
     landmarks      float32 [N, 468, 3], isotropic pixels, frame C; NaN where not detected
-    anchors        float64 [468, 3], the points on the mesh at pose zero, frame C, mm, pivot at
-                   the origin; NaN where the head has none
-    visible        bool [N, 468], False where there is no anchor
     images         N encoded image files; image_suffix is theirs, such as ".png"
-    passes         N multilayer OpenEXR files and the SHA-256 of their decoded floats; None
-                   where no passes were asked for
     """
 
     subject: str
@@ -65,11 +57,8 @@ class UnitRows:
     camera: Camera
     detected: np.ndarray
     landmarks: np.ndarray
-    anchors: np.ndarray
-    visible: np.ndarray
     images: Sequence[bytes]
     image_suffix: str = ".png"
-    passes: Sequence[tuple[bytes, str]] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.angles_deg)
@@ -78,8 +67,6 @@ class UnitRows:
             "indices": (self.indices.shape, (count, 3)),
             "detected": (self.detected.shape, (count,)),
             "landmarks": (self.landmarks.shape, (count, LANDMARKS, 3)),
-            "anchors": (self.anchors.shape, (LANDMARKS, 3)),
-            "visible": (self.visible.shape, (count, LANDMARKS)),
             "images": ((len(self.images),), (count,)),
         }
         for name, (actual, expected) in shapes.items():
@@ -89,13 +76,6 @@ class UnitRows:
         missing = np.isnan(self.landmarks).all(axis=(1, 2))
         if not np.where(self.detected, finite, missing).all():
             raise ValueError("landmarks must be finite where detected and all NaN where not")
-        anchored = np.isfinite(self.anchors).all(axis=1)
-        if not np.where(anchored, True, np.isnan(self.anchors).all(axis=1)).all():
-            raise ValueError("an anchor must be finite or all NaN")
-        if self.visible[:, ~anchored].any():
-            raise ValueError("a point without an anchor cannot be visible")
-        if self.passes is not None and len(self.passes) != count:
-            raise ValueError(f"passes: expected {count}, got {len(self.passes)}")
         for what in ("subject", "expression", "split"):
             check_name(what, getattr(self, what))
 
@@ -108,20 +88,6 @@ class UnitRows:
     def image_paths(self) -> list[str]:
         """Where each image is stored with images = "files", relative to the dataset."""
         return [image_path(self.subject, self.expression, pose, self.image_suffix) for pose in self.poses]
-
-    @property
-    def passes_paths(self) -> list[str]:
-        """Where the passes of each image are stored, relative to the dataset; "" without passes."""
-        if self.passes is None:
-            return [""] * len(self.angles_deg)
-        return [passes_path(self.subject, self.expression, pose) for pose in self.poses]
-
-    @property
-    def landmarks_exact(self) -> np.ndarray:
-        """R_C X + t of the anchors X, float32 [N, 468, 3], frame C, mm."""
-        rotation = rotation_from_angles(self.angles_deg)
-        points = self.anchors @ np.swapaxes(rotation, -1, -2) + self.camera.translation_mm
-        return points.astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -156,7 +122,6 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
         "redistributable": rows.redistributable,
         "camera": rows.camera.matrix,
         "translation_mm": rows.camera.translation_mm,
-        "projection": rows.camera.projection,
         "width": rows.camera.resolution,
         "height": rows.camera.resolution,
     }
@@ -167,12 +132,8 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
         "quaternion": quaternion_from_rotation(rotation),
         "detected": rows.detected,
         "landmarks": rows.landmarks,
-        "landmarks_exact": rows.landmarks_exact,
-        "landmarks_visible": rows.visible,
         "image_path": rows.image_paths if mode == "files" else [""] * count,
         "image_sha256": [hashlib.sha256(image).hexdigest() for image in rows.images],
-        "passes_path": rows.passes_paths,
-        "passes_sha256": [digest for _, digest in rows.passes] if rows.passes else [""] * count,
     }
     for axis, angle in enumerate(ANGLES):
         values[f"{angle}_deg"] = rows.angles_deg[:, axis]
@@ -208,7 +169,7 @@ def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
 
 
 def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> PartInfo:
-    """Store one unit: its image files where images = "files", its passes, then its part.
+    """Store one unit: its image files where images = "files", then its part.
 
     Raises DatasetError as :func:`write_part` does; then the part is not there.
     """
@@ -216,8 +177,6 @@ def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> Par
     if image_mode(schema) == "files":
         for relative, image in zip(rows.image_paths, rows.images, strict=True):
             write_bytes(root / relative, image)
-    for relative, (content, _) in zip(rows.passes_paths, rows.passes or (), strict=False):
-        write_bytes(root / relative, content)
     return write_part(table, root, rows.split, unit)
 
 
