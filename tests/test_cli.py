@@ -134,11 +134,18 @@ def test_preview_writes_one_picture(
 
 def test_a_build_needs_nothing_but_the_build_extra(parametric_heads: Path, tmp_path: Path) -> None:
     """Packages of the test tools and of the learning side are hidden; build and verify work."""
-    program = (
-        "import sys; sys.modules.update(dict.fromkeys("
-        "['pandas', 'polars', 'duckdb', 'datasets', 'torch', 'psutil', 'pytest'])); "
-        "from generator.cli import main; main()"
-    )
+    program = """
+import sys
+
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name in ("pandas", "polars", "duckdb", "datasets", "torch", "psutil", "pytest"):
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Hidden())
+from generator.cli import main
+main()
+"""
     python = [sys.executable, "-c", program]
     poses = ["--yaw=0,0,1", "--pitch=0,0,1", "--roll=0,0,1", "--resolution", "64", "--executor", "serial"]
     build = [*python, "build", "--heads", str(parametric_heads), *poses, "--out", "d"]
