@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Time of one face through encoder and heads (onnxruntime, batch 1, one thread) and the detector's.
+
+python benchmarks/latency.py                # untrained networks of both shapes: same graph, same time
+python benchmarks/latency.py model.onnx     # a trained one
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from downstream_hpe.export import export_onnx
+from downstream_hpe.networks import PoseNetwork, Weights
+from downstream_hpe.predictor import Predictor
+from downstream_hpe.training import RECIPES
+
+RUNS = 2000
+LIMIT_MS = 0.1
+
+
+def median_ms(call: Callable[[], object], runs: int = RUNS) -> tuple[float, float]:
+    """Median and 90th percentile of the wall time of a call, milliseconds."""
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    low, high = np.percentile(times, [50, 90]) * 1e3
+    return float(low), float(high)
+
+
+def time_model(name: str, path: Path) -> float:
+    predictor = Predictor.load(path, threads=1)
+    landmarks = np.random.default_rng(0).normal(size=(1, 468, 3)).astype(np.float32)
+    predictor.from_landmarks(landmarks)
+    middle, high = median_ms(lambda: predictor.from_landmarks(landmarks))
+    size = path.stat().st_size / 1e6
+    print(f"{name:34} median {middle:7.3f} ms   90 % {high:7.3f} ms   {size:.1f} MB")
+    return middle
+
+
+def time_detector() -> None:
+    try:
+        from mediapipe.python.solutions.face_mesh import FaceMesh
+        from skimage.data import astronaut
+    except ImportError as error:
+        print(f"landmark detector: not timed, {error.name} is not installed")
+        return
+    image = astronaut()
+    with FaceMesh(static_image_mode=True, max_num_faces=1) as detector:
+        detector.process(image)
+        middle, high = median_ms(lambda: detector.process(image), runs=50)
+    print(f"{'MediaPipe Face Mesh, 512 x 512':34} median {middle:7.3f} ms   90 % {high:7.3f} ms")
+
+
+def main() -> int:
+    if len(sys.argv) > 1:
+        middle = time_model(sys.argv[1], Path(sys.argv[1]))
+    else:
+        ranges = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
+        with tempfile.TemporaryDirectory() as folder:
+            for name, recipe in reversed(RECIPES.items()):
+                path = Path(folder) / f"{name}.onnx"
+                export_onnx(Weights(PoseNetwork(recipe.layers).eval(), "rms", ranges), path)
+                middle = time_model(f"{name}: {'-'.join(map(str, recipe.layers))}", path)
+    time_detector()
+    print(f"at most {LIMIT_MS} ms: {'yes' if middle <= LIMIT_MS else 'NO'} ({middle:.3f} ms)")
+    return 0 if middle <= LIMIT_MS else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

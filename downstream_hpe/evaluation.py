@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: MIT
+"""How far estimators are off: an angle, an interval of an angle, and overall, side by side."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from downstream_hpe.errors import DataError
+from downstream_hpe.metrics import axis_errors, euler_errors, geodesic_errors
+from downstream_hpe.rotation import angles_from_rotation, fit_rotation, rotation_from_angles
+
+ANGLES = ("yaw", "pitch", "roll")
+BOUNDS_DEG = (50.0, 40.0, 30.0)
+"""The paper's range of yaw, pitch and roll, either side of zero."""
+INTERVALS = 6
+"""Equal intervals an angle."""
+
+Estimator = Callable[[np.ndarray], np.ndarray]
+"""Landmarks float [N, 468, 3] -> (yaw, pitch, roll) in degrees, float [N, 3]."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Rows whose true angle lies in [low, high): mean |error| of that angle and mean geodesic error,
+    in degrees; NaN where there are none."""
+
+    angle: str
+    low: float
+    high: float
+    count: int
+    mae: float
+    geodesic: float
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Errors of one estimator over N rows, degrees.
+
+    mae: of yaw, pitch and roll. maev: mean angle between the rotation's axes. geodesic: mean.
+    geodesic_errors: float64 [N], for distributions.
+    """
+
+    name: str
+    count: int
+    mae: tuple[float, float, float]
+    maev: float
+    geodesic: float
+    intervals: tuple[Interval, ...]
+    geodesic_errors: np.ndarray
+
+    @property
+    def mean_mae(self) -> float:
+        """MAE as papers give it: the mean of the three angles'."""
+        return float(np.mean(self.mae))
+
+
+def evaluate(
+    name: str,
+    predicted_deg: np.ndarray,
+    rotation: np.ndarray,
+    bounds_deg: Sequence[float] = BOUNDS_DEG,
+) -> Evaluation:
+    """Compare estimates with the truth.
+
+    Parameters
+    ----------
+    predicted_deg: float [N, 3], (yaw, pitch, roll). rotation: float [N, 3, 3], the true R_C.
+    bounds_deg: the intervals divide [-bound, bound] of each angle into six.
+
+    Raises
+    ------
+    DataError: no rows, other shapes, or an estimate that is not finite.
+    """
+    predicted = np.asarray(predicted_deg, dtype=np.float64)
+    if not len(predicted) or predicted.shape != (len(rotation), 3):
+        raise DataError(
+            f"{name}: {predicted.shape} estimates of {len(rotation)} rows; expected [N, 3], N > 0"
+        )
+    if not np.isfinite(predicted).all():
+        raise DataError(f"{name}: an estimate is not finite")
+    true = angles_from_rotation(rotation)
+    errors = euler_errors(predicted, true)
+    turned = rotation_from_angles(predicted)
+    geodesic = geodesic_errors(turned, rotation)
+    intervals = []
+    for k, (angle, bound) in enumerate(zip(ANGLES, bounds_deg, strict=True)):
+        edges = np.linspace(-bound, bound, INTERVALS + 1)
+        for low, high in pairwise(edges):
+            # The last interval is closed: a grid's own bounds belong to it.
+            below = true[:, k] < high - 1e-9 if high < bound else true[:, k] <= high + 1e-9
+            inside = (true[:, k] >= low - 1e-9) & below
+            count = int(inside.sum())
+            mae, mean = (errors[inside, k].mean(), geodesic[inside].mean()) if count else (np.nan, np.nan)
+            intervals.append(Interval(angle, float(low), float(high), count, float(mae), float(mean)))
+    return Evaluation(
+        name,
+        len(predicted),
+        tuple(errors.mean(axis=0).tolist()),
+        float(axis_errors(turned, rotation).mean()),
+        float(geodesic.mean()),
+        tuple(intervals),
+        geodesic,
+    )
+
+
+def within_bounds(ypr_deg: np.ndarray, bounds_deg: Sequence[float] = BOUNDS_DEG) -> np.ndarray:
+    """Rows with every angle inside its bound: bool [N]."""
+    return (np.abs(ypr_deg) <= np.asarray(bounds_deg) + 1e-9).all(axis=1)
+
+
+def constant_zero(landmarks: np.ndarray) -> np.ndarray:
+    """The baseline that always answers (0, 0, 0). Implements Estimator."""
+    return np.zeros((len(landmarks), 3))
+
+
+def rigid_fit(reference: np.ndarray) -> Estimator:
+    """The baseline that fits a reference face [468, 3], frame C, rigidly to the landmarks."""
+
+    def estimate(landmarks: np.ndarray) -> np.ndarray:
+        return angles_from_rotation(fit_rotation(reference, np.asarray(landmarks, dtype=np.float64)))
+
+    return estimate
+
+
+def split_subjects(subjects: np.ndarray, share: float, seed: int = 0) -> np.ndarray:
+    """Rows held out for validation: bool [N], all rows of a subject together.
+
+    The subjects with the smallest hashes are held out, so that adding heads never moves another one
+    across more than the edge. At least one subject stays on either side.
+
+    Raises
+    ------
+    DataError: one subject only, or a share outside (0, 1).
+    """
+    names = np.unique(subjects)
+    if len(names) < 2 or not 0 < share < 1:
+        raise DataError(
+            f"cannot hold out {share:g} of {len(names)} subjects; expected two or more and 0 < share < 1"
+        )
+    order = sorted(names, key=lambda name: hashlib.sha256(f"{seed}/{name}".encode()).digest())
+    count = min(max(round(share * len(names)), 1), len(names) - 1)
+    return np.isin(subjects, order[:count])
+
+
+def markdown(evaluations: Sequence[Evaluation]) -> str:
+    """The overall table, a row an estimator, then mean |error| a true interval."""
+    lines = [
+        "| estimator | rows | yaw | pitch | roll | MAE | MAEV | geodesic |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for e in evaluations:
+        cells = [*e.mae, e.mean_mae, e.maev, e.geodesic]
+        lines.append(f"| {e.name} | {e.count} | " + " | ".join(f"{value:.2f}" for value in cells) + " |")
+    lines += [
+        "",
+        "| angle | interval | rows | " + " | ".join(e.name for e in evaluations) + " |",
+        "| --- | --- | ---: | " + " | ".join("---:" for _ in evaluations) + " |",
+    ]
+    for same in zip(*(e.intervals for e in evaluations), strict=True):
+        first = same[0]
+        values = " | ".join("-" if not i.count else f"{i.mae:.2f}" for i in same)
+        lines.append(f"| {first.angle} | {first.low:.4g} to {first.high:.4g} | {first.count} | {values} |")
+    return "\n".join(lines) + "\n"
+
+
+def write_csv(evaluations: Sequence[Evaluation], path: Path) -> None:
+    """One line an estimator and interval, and one with angle "all" an estimator."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(
+            ["estimator", "angle", "low_deg", "high_deg", "rows", "mae_deg", "maev_deg", "geodesic_deg"]
+        )
+        for e in evaluations:
+            writer.writerow(
+                [e.name, "all", "", "", e.count, f"{e.mean_mae:.6f}", f"{e.maev:.6f}", f"{e.geodesic:.6f}"]
+            )
+            for angle, mae in zip(ANGLES, e.mae, strict=True):
+                writer.writerow([e.name, angle, "", "", e.count, f"{mae:.6f}", "", ""])
+            for i in e.intervals:
+                cells = [f"{i.mae:.6f}", "", f"{i.geodesic:.6f}"] if i.count else ["", "", ""]
+                writer.writerow([e.name, i.angle, f"{i.low:g}", f"{i.high:g}", i.count, *cells])
+
+
+def plot_intervals(evaluations: Sequence[Evaluation], path: Path) -> None:
+    """Mean |error| of each angle over its intervals, a line an estimator, one panel an angle."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 3.8), layout="constrained")
+    for panel, angle in zip(figure.subplots(1, 3), ANGLES, strict=True):
+        for e in evaluations:
+            mine = [i for i in e.intervals if i.angle == angle and i.count]
+            panel.plot(
+                [(i.low + i.high) / 2 for i in mine], [i.mae for i in mine], "o-", markersize=4, label=e.name
+            )
+        panel.set(xlabel=f"true {angle} (degrees)", title=angle, ylim=(0, None))
+        panel.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("mean error (degrees)")
+    figure.axes[-1].legend(fontsize=8)
+    figure.savefig(path, dpi=150)
+
+
+def plot_distribution(evaluations: Sequence[Evaluation], path: Path) -> None:
+    """The share of rows whose geodesic error is below a value, a curve an estimator."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.5, 4), layout="constrained")
+    panel = figure.subplots()
+    for e in evaluations:
+        panel.plot(np.sort(e.geodesic_errors), np.arange(1, e.count + 1) / e.count, label=e.name)
+    panel.set(xlabel="geodesic error (degrees)", ylabel="share of rows", xlim=(0, 20), ylim=(0, 1))
+    panel.grid(alpha=0.3)
+    panel.legend(fontsize=8, loc="lower right")
+    figure.savefig(path, dpi=150)

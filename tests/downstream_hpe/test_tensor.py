@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import json
+
+import ideal
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from downstream_hpe.errors import DataError
+from downstream_hpe.normalise import normalise
+from downstream_hpe.tables import ROTATION, SCHEMA_MAJOR, TOPOLOGY, open_tables, read_rows
+from downstream_hpe.tensor import open_tensor
+
+HEADS = ("amy", "bob", "cid")
+HOLE = 7
+
+
+@pytest.fixture
+def heads():
+    faces = ideal.Faces().draw(3, np.random.default_rng(1))
+    return {name: ideal.rows(face, name) for name, face in zip(HEADS, faces, strict=True)}
+
+
+@pytest.fixture
+def dataset(tmp_path, heads):
+    """bob's rows are split over two files whose names sort after and before the others."""
+    half = {name: values[:60] for name, values in heads["bob"].items()}
+    rest = {name: values[60:] for name, values in heads["bob"].items()}
+    for name, columns in {"5": heads["amy"], "9": half, "1": rest, "6": heads["cid"]}.items():
+        ideal.write(tmp_path / "data" / "train" / f"part-{name}.parquet", columns)
+    ideal.write(tmp_path / "heads.parquet", {"subject": np.array(HEADS)}, {})
+    return tmp_path
+
+
+def write_heads(folder, heads):
+    for name, columns in heads.items():
+        ideal.write(folder / f"{name}.parquet", columns)
+    return folder
+
+
+def test_tensor_is_the_normalised_landmarks_of_each_cell(dataset, heads):
+    tensor = open_tensor(dataset)
+    assert tensor.heads == tuple(f"{name}/neutral" for name in HEADS)
+    assert tensor.shape == (3, 5, 5, 5, 1404)
+    values = tensor.to_array()
+    for n, name in enumerate(HEADS):
+        expected = normalise(heads[name]["landmarks"].reshape(-1, 468, 3))
+        np.testing.assert_array_equal(values[n].reshape(expected.shape), expected)
+    assert not tensor.report.cells
+    np.testing.assert_array_equal(tensor.axes_deg[2], ideal.AXES[2])
+
+
+def test_normalisations():
+    landmarks = np.random.default_rng(0).normal(size=(4, 468, 3)) * 50 + 100
+    paper = normalise(landmarks)
+    np.testing.assert_allclose(paper.mean(axis=1), 0, atol=1e-12)
+    np.testing.assert_allclose((paper**2).sum(-1).mean(-1), 1)
+    code = normalise(landmarks, "eyes")
+    np.testing.assert_allclose(code[:, 1], 0)
+    np.testing.assert_allclose(np.linalg.norm(code[:, 33] - code[:, 263], axis=-1), 1)
+    with pytest.raises(ValueError, match="coincide"):
+        normalise(np.ones((468, 3)))
+
+
+def test_holes_are_refused_and_named(tmp_path, heads):
+    ideal.drop(heads["bob"], HOLE)
+    heads["cid"] = {name: np.delete(values, 3, axis=0) for name, values in heads["cid"].items()}
+    with pytest.raises(
+        DataError, match=r"2 cells without landmarks \(1 of them without a row\): bob/neutral at yaw"
+    ):
+        open_tensor(write_heads(tmp_path, heads))
+
+
+def test_masked_holes_are_nan_and_nothing_else_is(tmp_path, heads):
+    ideal.drop(heads["bob"], HOLE)
+    tensor = open_tensor(write_heads(tmp_path, heads), holes="mask")
+    values = tensor.to_array().reshape(3, -1, 1404)
+    assert np.isnan(values[1, HOLE]).all()
+    assert np.isnan(values).sum() == 1404
+    assert tensor.report.text().startswith("1 cells without landmarks left out of the fit")
+    np.testing.assert_array_equal(tensor.observed, ~np.isnan(values[..., 0]).reshape(3, 5, 5, 5))
+
+
+def test_rotated_frontal_fills_rigid_heads_exactly(tmp_path, heads):
+    true = open_tensor(write_heads(tmp_path / "whole", heads)).to_array()
+    ideal.drop(heads["bob"], HOLE)
+    tensor = open_tensor(write_heads(tmp_path / "holes", heads), holes="rotate")
+    np.testing.assert_allclose(tensor.to_array(), true, atol=1e-5)
+    assert len(tensor.report.cells) == 1
+
+
+def test_rotate_needs_the_frontal_cell(tmp_path, heads):
+    axes = (np.array([-30.0, -10, 10, 30]), *ideal.AXES[1:])
+    faces = ideal.Faces().draw(2, np.random.default_rng(1))
+    uneven = {name: ideal.rows(face, name, axes) for name, face in zip("ab", faces, strict=True)}
+    with pytest.raises(DataError, match="no cell at 0, 0, 0"):
+        open_tensor(write_heads(tmp_path, uneven), holes="rotate")
+
+
+@pytest.mark.parametrize(("projection", "away"), [("orthographic", 700.0), ("perspective", 1e6)])
+def test_exact_landmarks_fill_what_the_detector_missed(tmp_path, heads, projection, away):
+    camera = np.array([800.0, 0, 128, 0, 800, 128, 0, 0, 1])
+    for columns in heads.values():
+        # Seen from afar perspective, too, is the parallel projection the pixels were made with.
+        points = columns["landmarks"].astype(float).reshape(-1, 468, 3) - 128
+        columns["landmarks_exact"] = (points + np.array([0, 0, away])).reshape(-1, 1404)
+        columns["camera"] = np.tile(camera, (len(points), 1))
+        columns["translation_mm"] = np.tile([0.0, 0, away], (len(points), 1))
+        columns["projection"] = np.array([projection] * len(points))
+    true = open_tensor(write_heads(tmp_path / "whole", heads)).to_array()
+    ideal.drop(heads["bob"], HOLE)
+    tensor = open_tensor(write_heads(tmp_path / "holes", heads), holes="exact")
+    np.testing.assert_allclose(tensor.to_array(), true, atol=1e-3 if projection == "perspective" else 1e-5)
+    assert "filled from exact landmarks" in tensor.report.text()
+
+
+def test_exact_without_its_column_says_so(dataset):
+    with pytest.raises(DataError, match="no column landmarks_exact; choose mask or rotate"):
+        open_tensor(dataset, holes="exact")
+
+
+def _without_landmarks(columns):
+    del columns["landmarks"]
+
+
+def _nan_though_detected(columns):
+    columns["landmarks"][HOLE, 5] = np.nan
+
+
+def _other_rotation(columns):
+    columns["rotation"] = columns["rotation"].reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
+
+
+def _two_rows_for_one_cell(columns):
+    columns["yaw_index"][0] = columns["yaw_index"][-1]
+    columns["yaw_deg"][0] = columns["yaw_deg"][-1]
+    columns["pitch_index"][0] = columns["pitch_index"][-1]
+    columns["pitch_deg"][0] = columns["pitch_deg"][-1]
+    columns["roll_index"][0] = columns["roll_index"][-1]
+    columns["roll_deg"][0] = columns["roll_deg"][-1]
+
+
+def _two_grids(columns):
+    columns["yaw_deg"] = columns["yaw_deg"] + 1
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (_without_landmarks, "no column landmarks"),
+        (_nan_though_detected, "is detected but its landmarks are not finite"),
+        (_other_rotation, "rotation of .* is not Rx"),
+        (_two_rows_for_one_cell, "two rows for bob/neutral"),
+        (_two_grids, "yaw_index 0 is -50° in one row and -49°"),
+    ],
+)
+def test_bad_rows_end_in_one_line(tmp_path, heads, spoil, message):
+    spoil(heads["bob"])
+    with pytest.raises(DataError, match=message) as caught:
+        open_tensor(write_heads(tmp_path, heads), holes="mask").to_array()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("headturn.schema_version", "2.0.0", "schema version 2.0.0, expected 1.x"),
+        ("headturn.schema_version", "1.1.0", "schema_version differs"),
+        ("headturn.landmark_topology", "dlib-68", "landmark topology dlib-68"),
+        ("headturn.conventions", json.dumps({"rotation": "Rz Ry Rx"}), "rotation convention"),
+        ("headturn.conventions", "{}", "names no rotation"),
+        ("headturn.conventions", None, "no headturn.conventions in its metadata"),
+    ],
+)
+def test_foreign_or_mixed_tables_are_refused(tmp_path, heads, key, value, message):
+    ideal.write(tmp_path / "a.parquet", heads["amy"])
+    metadata = {k: v for k, v in {**ideal.METADATA, key: value}.items() if v is not None}
+    ideal.write(tmp_path / "b.parquet", heads["bob"], metadata)
+    with pytest.raises(DataError, match=message):
+        open_tensor(tmp_path)
+
+
+def test_one_identity_nothing_there_and_no_parquet(tmp_path, heads):
+    with pytest.raises(DataError, match="1 heads on a grid"):
+        open_tensor(write_heads(tmp_path / "one", {"amy": heads["amy"]}))
+    with pytest.raises(DataError, match=r"no \.parquet file"):
+        open_tensor(tmp_path / "nowhere")
+    (tmp_path / "bad.parquet").write_bytes(b"PAR1 no")
+    with pytest.raises(DataError, match="not a readable Parquet file"):
+        open_tensor(tmp_path / "bad.parquet")
+
+
+def test_rows_leave_out_the_undetected_and_keep_the_split(tmp_path, heads):
+    ideal.drop(heads["bob"], HOLE)
+    heads["cid"]["split"][:] = "validation"
+    write_heads(tmp_path, heads)
+    train = read_rows(tmp_path, "train")
+    assert len(train) == 2 * 125 - 1
+    assert train.undetected == 1
+    assert set(train.subjects) == {"amy", "bob"}
+    with pytest.raises(DataError, match="no row of split 'test'"):
+        read_rows(tmp_path, "test")
+
+
+def test_the_contract_is_what_the_generator_writes(tmp_path):
+    schema = pytest.importorskip("generator.dataset.schema")
+    written = schema.part_schema("none", {}, "")
+    assert written.metadata[b"headturn.schema_version"].decode().split(".")[0] == SCHEMA_MAJOR
+    assert written.metadata[b"headturn.landmark_topology"].decode() == TOPOLOGY
+    assert ROTATION in schema.CONVENTIONS["rotation"]
+    pq.write_table(pa.Table.from_pylist([], schema=written), tmp_path / "empty.parquet")
+    columns = ideal.rows(np.zeros((468, 3)), "nobody")
+    assert open_tables(tmp_path, list(columns)).files
