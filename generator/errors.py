@@ -25,4 +25,8 @@ class DatasetError(HeadturnError):
 
 
 class WorkerError(HeadturnError):
-    """A render or landmark process failed."""
+    """A render or landmark process failed. log: the end of what it printed."""
+
+    def __init__(self, message: str, log: str = "") -> None:
+        super().__init__(message)
+        self.log = log

@@ -7,7 +7,10 @@ import json
 import sys
 import threading
 import time
-from typing import TextIO
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.progress import (
@@ -30,8 +33,35 @@ class _Rate(ProgressColumn):
         return Text(f"{task.completed / task.elapsed:.1f}/s" if task.elapsed and task.completed else "")
 
 
+class Tally:
+    """What a build's events add up to."""
+
+    def __init__(self) -> None:
+        self.units = self.restarts = self.quarantined = 0
+        self.seconds: Counter[str] = Counter()
+
+    def add(self, kind: str, facts: dict[str, Any]) -> None:
+        """Count an event of :class:`generator.execution.status.Reporter`."""
+        self.units += kind == "unit"
+        self.quarantined += kind == "quarantined"
+        self.restarts += facts.get("attempts", 1) - 1
+        self.seconds.update(facts.get("seconds", {}))
+
+    @property
+    def load(self) -> dict[str, float]:
+        """Share of the lanes' time in each stage, the largest first."""
+        total = sum(self.seconds.values()) or 1.0
+        return {stage: round(spent / total, 3) for stage, spent in self.seconds.most_common()}
+
+    def __str__(self) -> str:
+        shares = [f"{stage} {share:.0%}" for stage, share in list(self.load.items())[:3]]
+        troubles = [f"{self.restarts} restarts"] if self.restarts else []
+        troubles += [f"{self.quarantined} quarantined"] if self.quarantined else []
+        return " · ".join(shares + troubles)
+
+
 class TerminalReporter:
-    """A progress bar with rate and time left; plain lines where there is no terminal."""
+    """A progress bar with rate, time left, load and troubles; plain lines where there is no terminal."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -43,10 +73,12 @@ class TerminalReporter:
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
+            TextColumn("{task.fields[status]}", style="dim"),
             console=console,
             disable=not console.is_terminal,
         )
         self._task: TaskID | None = None
+        self._tally = Tally()
 
     def __enter__(self) -> TerminalReporter:
         self._progress.start()
@@ -59,7 +91,7 @@ class TerminalReporter:
         """A stage begins."""
         if not self._console.is_terminal:
             self._console.print(f"{name}: {total}", highlight=False)
-        self._task = self._progress.add_task(name, total=total)
+        self._task = self._progress.add_task(name, total=total, status="")
 
     def advance(self, steps: int = 1) -> None:
         """Steps of the current stage are done."""
@@ -69,6 +101,19 @@ class TerminalReporter:
     def note(self, text: str) -> None:
         """A line above the bar."""
         self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    def event(self, kind: str, facts: dict[str, Any]) -> None:
+        """Show what the events add up to beside the bar."""
+        self._tally.add(kind, facts)
+        if self._task is not None:
+            self._progress.update(self._task, status=str(self._tally))
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Leave the terminal to a question."""
+        self._progress.stop()
+        yield
+        self._progress.start()
 
 
 class JsonReporter:
@@ -80,6 +125,7 @@ class JsonReporter:
         self._stream = stream or sys.stdout
         self._lock = threading.Lock()
         self._name, self._total, self._done = "", 0, 0
+        self._tally = Tally()
         self._began = self._last = time.monotonic()
 
     def __enter__(self) -> JsonReporter:
@@ -112,6 +158,9 @@ class JsonReporter:
                         "total": self._total,
                         "rate": round(rate, 2),
                         "eta_s": round(left, 1),
+                        "load": self._tally.load,
+                        "restarts": self._tally.restarts,
+                        "quarantined": self._tally.quarantined,
                     }
                 )
 
@@ -119,6 +168,12 @@ class JsonReporter:
         """A line worth reading."""
         with self._lock:
             self._write({"event": "note", "text": text})
+
+    def event(self, kind: str, facts: dict[str, Any]) -> None:
+        """Something happened; see :class:`generator.execution.status.Reporter`."""
+        with self._lock:
+            self._tally.add(kind, facts)
+            self._write({"event": kind, **facts})
 
     def _write(self, record: dict[str, object]) -> None:
         self._stream.write(json.dumps(record) + "\n")

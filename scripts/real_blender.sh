@@ -4,16 +4,16 @@
 #
 #     scripts/real_blender.sh [trixie|sid]     trixie has 4.3, sid the newest
 #
-# Prints the path of a `blender` command that behaves like an installed one: it sees this
-# checkout, the current folder, /tmp and /dev/shm at their own places. Needs root on Debian;
-# takes about three minutes the first time and nothing after that. Nothing stays mounted.
+# Prints the path of a `blender` command that behaves like an installed one: it sees the folders
+# of users and temporary files at their own places. `run-<suite>` beside it runs anything there,
+# such as xvfb-run. Needs root on Debian; takes one to three minutes the first time and nothing
+# after that. Nothing stays mounted.
 set -euo pipefail
 
 suite=${1:-trixie}
 base=${HEADTURN_BLENDER_ROOT:-/opt/headturn-blender}
 root=$base/$suite
 command=$base/blender-$suite
-checkout=$(cd "$(dirname "$0")/.." && pwd)
 log=$base/$suite.log
 
 if [ ! -e "$root/.ready" ]; then
@@ -22,7 +22,7 @@ if [ ! -e "$root/.ready" ]; then
         exit 1
     fi
     mkdir -p "$base"
-    echo "setting up Blender from Debian $suite in $root (about three minutes, log in $log)" >&2
+    echo "setting up Blender from Debian $suite in $root (one to three minutes, log in $log)" >&2
     {
         rm -rf "$root"
         apt-get update -qq
@@ -46,23 +46,32 @@ if [ ! -e "$root/.ready" ]; then
     } >"$log" 2>&1 || { tail -n 5 "$log" >&2; echo "scripts/real_blender.sh: failed, see $log" >&2; exit 1; }
 fi
 
+[ -e "$root/etc/mtab" ] || ln -s /proc/self/mounts "$root/etc/mtab"
+
 # Each call gets a mount namespace of its own, so nothing outlives it. Without a PID namespace:
-# xvfb-run hangs as process 1.
-cat >"$command" <<EOF
+# xvfb-run hangs as process 1. Folders that are not part of a system keep their places, and
+# $HEADTURN_OUTSIDE names a process outside, so that nsenter finds the way back to a host Python.
+cat >"$base/run-$suite" <<EOF
 #!/bin/bash
+export HEADTURN_OUTSIDE=\$PPID
 exec unshare --mount --propagation private bash -c '
-    root=\$1; checkout=\$2; shift 2
-    mount --rbind /proc "\$root/proc"
-    mount --rbind /dev "\$root/dev"
-    for folder in "\$checkout" "\$PWD" /tmp \${HEADTURN_BIND:-}; do
-        [ -d "\$folder" ] && [ "\$folder" != / ] || continue
-        mkdir -p "\$root\$folder"
-        mount --rbind "\$folder" "\$root\$folder"
+    root=\$1; shift
+    for folder in /*; do
+        case \$folder in
+            /bin | /boot | /etc | /lib* | /opt | /run | /sbin | /sys | /usr | /var) continue ;;
+        esac
+        [ -d "\$folder" ] && [ ! -L "\$folder" ] || continue
+        mkdir -p "\$root\$folder" && mount --rbind "\$folder" "\$root\$folder" || exit 1
     done
-    exec chroot "\$root" env -i HOME=/root LANG=C.UTF-8 PATH=/usr/bin:/bin PYTHONPATH= \\
-        DISPLAY="\${DISPLAY:-}" BLENDER_USER_RESOURCES="\${BLENDER_USER_RESOURCES:-}" \\
-        sh -c '\''cd "\$1" && shift && exec blender "\$@"'\'' sh "\$PWD" "\$@"
-' bash "$root" "$checkout" "\$@"
+    kept=()
+    for name in \$(compgen -e HEADTURN_; compgen -e BLENDER_; compgen -e DISPLAY); do
+        kept+=("\$name=\${!name}")
+    done
+    mkdir -p "\$root/var/home"
+    exec chroot "\$root" env -i HOME=/var/home LANG=C.UTF-8 PATH=/usr/bin:/bin "\${kept[@]}" \
+        sh -c '\''cd "\$1" && shift && exec "\$@"'\'' sh "\$PWD" "\$@"
+' bash "$root" "\$@"
 EOF
-chmod +x "$command"
+printf '#!/bin/bash\nexec "%s/run-%s" blender "$@"\n' "$base" "$suite" >"$command"
+chmod +x "$base/run-$suite" "$command"
 echo "$command"

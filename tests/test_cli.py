@@ -22,7 +22,10 @@ def headturn(*arguments: str | Path, monkeypatch: pytest.MonkeyPatch) -> int:
     return stopped.value.code or 0
 
 
-COMMANDS = [[], ["heads"], ["heads", "make"], ["heads", "list"], ["build"], ["verify"], ["preview"]]
+COMMANDS = [
+    *([], ["heads"], ["heads", "make"], ["heads", "list"], ["build"], ["verify"], ["preview"]),
+    *(["export"], ["report"], ["compact"]),
+]
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ([], ["heads"])], ids=" ".join)
@@ -50,6 +53,7 @@ BAD = {
     "sobol without a count": (["build", "--poses", "sobol"], 2, "sobol:500"),
     "missing pose file": (["build", "--poses", "poses.csv"], 2, "poses.csv"),
     "no such blender": (["build", "--blender", "/nowhere/blender"], 2, "/nowhere/blender"),
+    "address without ray": (["build", "--address", "auto"], 2, "--address is for --executor ray"),
     "preview a pose of two": (["preview", "empty", "--pose", "1,2"], 2, "--pose '1,2'"),
     "preview to a text file": (["preview", "empty", "--out", "a.txt"], 2, "a.txt"),
     "list nothing": (["heads", "list", "nowhere"], 2, "nowhere"),

@@ -19,3 +19,11 @@ def use_still_images(settings: bpy.types.ImageFormatSettings) -> None:
     """5.x asks for the medium before the file format."""
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
+
+
+def use_multilayer(settings: bpy.types.ImageFormatSettings) -> None:
+    """OpenEXR with every pass, float32."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth, settings.exr_codec = "32", "NONE"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -10,9 +11,11 @@ import numpy as np
 from mathutils import Matrix
 
 from generator.blender import compat
+from generator.blender.crop import Backdrop, Box, Outline
 from generator.blender.light import build_light
 from generator.blender.materials import UV_MAP, VERTEX_COLORS, build_material, srgb_to_linear
-from generator.geometry.camera import SENSOR_MM
+from generator.blender.passes import render_passes
+from generator.geometry.camera import SENSOR_MM, Camera
 from generator.geometry.rotation import (
     BLENDER_FROM_GRAPHICS,
     blender_rotation,
@@ -27,45 +30,88 @@ METRES = 1e-3
 QUALITY_BOUNCES = 2
 
 
-def build_scene(
-    mesh: HeadMesh, settings: RenderSettings, distance_mm: float, *, threads: int = 0
-) -> bpy.types.Object:
-    """Replace everything in Blender by this head, its light and its camera.
+class Stage:
+    """The scene in Blender: replaces everything there by one head, its light and its camera.
 
     Parameters
     ----------
     mesh: frame U, mm, pivot at the origin.
     distance_mm: camera to pivot.
     threads: of Cycles; 0 lets Blender take every core.
-
-    Returns
-    -------
-    The head's object, to be turned by :func:`turn`.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
+
+    def __init__(
+        self, mesh: HeadMesh, settings: RenderSettings, distance_mm: float, *, threads: int = 0
+    ) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        self._head = fill_scene(bpy.context.scene, mesh, settings, distance_mm, threads=threads)
+        self._outline = Outline(
+            mesh.vertices, Camera(settings.resolution, settings.lens_mm, distance_mm, settings.projection)
+        )
+        self._backdrop: Backdrop | None = None
+        self._knows_uv = False
+        self._frames = 0
+
+    def render(self, ypr_deg: Sequence[float], path: Path) -> None:
+        """Render the head at (yaw, pitch, roll) degrees into path: .bmp (sRGB) or .exr (linear float32).
+
+        Both are lossless and quick to write; what is kept of a frame is encoded by
+        the host, without the times and dates that Blender puts into a PNG. Of a
+        .bmp only the pixels the head can cover are rendered: the same bytes in less time.
+        """
+        turn(self._head, ypr_deg)
+        self._knows_uv = False
+        self._frames += 1
+        # The backdrop costs as much as a frame, so it is made for the second.
+        if path.suffix != ".bmp" or self._frames == 1:
+            _render(path)
+            return
+        if self._backdrop is None:
+            self._head.hide_render = True
+            _render(path)
+            self._head.hide_render = False
+            self._backdrop = Backdrop(path)
+        box = self._outline.box(ypr_deg)
+        if box is not None:
+            _render(path, box)
+        self._backdrop.lay(path, box)
+
+    def render_passes(self, ypr_deg: Sequence[float], path: Path, passes: Sequence[str]) -> None:
+        """Render passes at (yaw, pitch, roll) degrees; see :mod:`generator.blender.passes`."""
+        turn(self._head, ypr_deg)
+        if "uv" in passes and not self._knows_uv:
+            # Persistent data keeps the mesh as pictures need it, which is without its UV map.
+            self._head.data.update_tag()
+            self._knows_uv = True
+        render_passes(path, self._head, passes)
+
+
+def fill_scene(
+    scene: bpy.types.Scene, mesh: HeadMesh, settings: RenderSettings, distance_mm: float, *, threads: int = 0
+) -> bpy.types.Object:
+    """Put a head, its light and its camera into an empty scene, as :class:`Stage` does.
+
+    Returns the head's object, to be turned by :func:`turn`.
+    """
     head = _build_head(mesh, settings)
     scene.collection.objects.link(head)
-    background = srgb_to_linear(settings.background)
-    build_light(scene, settings, background)
+    scene.collection.objects.link(_unseen_twin(head))
+    build_light(scene, settings, srgb_to_linear(settings.background))
     _build_camera(scene, settings, distance_mm)
     _set_render(scene, settings, threads)
     return head
 
 
-def turn(head: bpy.types.Object, ypr_deg: tuple[float, float, float]) -> None:
+def turn(head: bpy.types.Object, ypr_deg: Sequence[float]) -> None:
     """Set the head's rotation to R_B of (yaw, pitch, roll) in degrees."""
     rotation = blender_rotation(rotation_from_angles(np.asarray(ypr_deg, dtype=np.float64)))
     head.matrix_world = Matrix(rotation.tolist()).to_4x4()
 
 
-def render(path: Path) -> None:
-    """Render the scene as it stands into path: .bmp (8-bit sRGB) or .exr (linear float32).
-
-    Both are lossless and quick to write; what is kept of a frame is encoded by
-    the host, without the times and dates that Blender puts into a PNG.
-    """
-    settings = bpy.context.scene.render.image_settings
+def _render(path: Path, box: Box | None = None) -> None:
+    """Render the scene as it stands into path, or the pixels of a box alone."""
+    render = bpy.context.scene.render
+    settings = render.image_settings
     compat.use_still_images(settings)
     if path.suffix == ".exr":
         settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
@@ -73,8 +119,28 @@ def render(path: Path) -> None:
         settings.file_format, settings.color_mode = "BMP", "RGB"
     else:
         raise ValueError(f"{path}: frames are .bmp or .exr")
-    bpy.context.scene.render.filepath = str(path)
+    render.use_border = render.use_crop_to_border = box is not None
+    if box is not None:
+        # Blender cuts to whole pixels; a quarter more keeps rounding from losing one.
+        left, right, bottom, top = ((edge + 0.25) / render.resolution_x for edge in box)
+        render.border_min_x, render.border_max_x = left, right
+        render.border_min_y, render.border_max_y = bottom, top
+    render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+
+
+def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
+    """A second user of the head's mesh that no ray can hit.
+
+    Cycles bakes the transform of an object into a mesh that it has to itself, and
+    builds the ray-casting tree anew at every pose. With a second user it keeps the tree.
+    """
+    twin = bpy.data.objects.new("twin", head.data)
+    twin.visible_camera = twin.visible_diffuse = twin.visible_glossy = False
+    twin.visible_transmission = twin.visible_shadow = False
+    # Visible to nothing at all it would be left out; nothing here scatters in a volume.
+    twin.visible_volume_scatter = True
+    return twin
 
 
 def _build_head(mesh: HeadMesh, settings: RenderSettings) -> bpy.types.Object:
@@ -110,6 +176,10 @@ def _build_camera(scene: bpy.types.Scene, settings: RenderSettings, distance_mm:
     data.sensor_fit = "HORIZONTAL"
     data.sensor_width = SENSOR_MM
     data.lens = settings.lens_mm
+    if settings.projection == "orthographic":
+        data.type = "ORTHO"
+        view = Camera(settings.resolution, settings.lens_mm, distance_mm, "orthographic")
+        data.ortho_scale = view.view_mm * METRES
     data.clip_start = 0.01 * distance_mm * METRES
     data.clip_end = 100 * distance_mm * METRES
     camera = bpy.data.objects.new("camera", data)

@@ -4,8 +4,9 @@
 One JSON object a line in both directions. Orders:
 
 ``{"op": "render", "package": FILE.npz, "settings": {...}, "distance_mm": D,
-"poses": [[yaw, pitch, roll], ...], "out": FOLDER, "format": "bmp" or "exr"}``
-    renders each pose into ``FOLDER/<index>.<format>``; answers ``{"frame": index, "path": ...}``
+"poses": [[yaw, pitch, roll], ...], "out": FOLDER, "format": "bmp" or "exr", "passes": [...]}``
+    renders each pose into ``FOLDER/<index>.<format>``, or with passes ("depth", "normal", ...) these
+    alone, as a multilayer .exr; answers ``{"frame": index, "path": ...}``
     after each and ``{"done": count}`` at the end. The head stays loaded until another is named.
 ``{"op": "convert", "source": FILE.fbx, "target": FILE.glb}``
     reads a mesh with Blender's importer and writes it as glTF; answers ``{"done": 1}``.
@@ -53,6 +54,7 @@ import bpy  # noqa: E402
 from generator.blender import compat, scene  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
 from generator.plan.render_settings import RenderSettings  # noqa: E402
+from generator.process import end_with_parent  # noqa: E402
 
 
 class RenderWorker:
@@ -61,7 +63,7 @@ class RenderWorker:
     def __init__(self, threads: int) -> None:
         self._threads = threads
         self._loaded: tuple[Any, ...] | None = None
-        self._head: bpy.types.Object | None = None
+        self._stage: scene.Stage | None = None
 
     def render(self, order: dict[str, Any], answer: Any) -> None:
         """Carry out a render order; answer is called with each receipt."""
@@ -71,13 +73,16 @@ class RenderWorker:
         if wanted != self._loaded:
             self._loaded = None
             mesh = load_package(package)
-            self._head = scene.build_scene(mesh, settings, order["distance_mm"], threads=self._threads)
+            self._stage = scene.Stage(mesh, settings, order["distance_mm"], threads=self._threads)
             self._loaded = wanted
+        assert self._stage is not None
         out = Path(order["out"])
         for index, pose in enumerate(order["poses"]):
-            scene.turn(self._head, pose)
             path = out / f"{index:06d}.{order['format']}"
-            scene.render(path)
+            if order.get("passes"):
+                self._stage.render_passes(pose, path, order["passes"])
+            else:
+                self._stage.render(pose, path)
             answer({"frame": index, "path": str(path)})
         answer({"done": len(order["poses"])})
 
@@ -92,9 +97,10 @@ class RenderWorker:
 
 def main(threads: int) -> None:
     """Serve orders from stdin until it closes."""
-    # Blender prints to stdout; receipts get the real one to themselves.
+    end_with_parent()
+    # Receipts get stdout to themselves. What Blender prints there, 5 kB a frame, would fill the log.
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
     def answer(receipt: dict[str, Any]) -> None:
         receipts.write(json.dumps(receipt) + "\n")
@@ -105,6 +111,8 @@ def main(threads: int) -> None:
     answer({"ready": version})
     for line in sys.stdin:
         order = json.loads(line)
+        named = {key: value for key, value in order.items() if key not in ("poses", "settings")}
+        print(f"order: {named}", file=sys.stderr, flush=True)
         try:
             orders[order["op"]](order, answer)
         except Exception as error:

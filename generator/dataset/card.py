@@ -15,7 +15,7 @@ from generator.dataset.schema import CONVENTIONS
 
 CARD_FILE = "README.md"
 
-_COLUMNS = (
+COLUMNS = (
     ("sample_id, subject, expression, split", "identity; sample_id is subject/expression/pose"),
     ("head_license, redistributable", "licence of the head; may its images be published?"),
     ("yaw_deg, pitch_deg, roll_deg", "the pose, degrees, exact"),
@@ -25,7 +25,11 @@ _COLUMNS = (
     ("camera, translation_mm", "K, 9 numbers, row-major, pixels; the head's pivot in the camera frame"),
     ("detected", "was the face found?"),
     ("landmarks", "1404 numbers: 468 x (x, y, z), isotropic pixels; NaN where not detected"),
+    ("projection", "perspective or orthographic"),
+    ("landmarks_exact", "1404 numbers: the same points on the mesh, frame C, mm; NaN without an anchor"),
+    ("landmarks_visible", "468 flags: does the camera see the exact landmark?"),
     ("width, height, image_path, image_sha256", "the image; its path is relative to this folder"),
+    ("passes_path, passes_sha256", "OpenEXR passes and the hash of their floats; empty without"),
 )
 
 _READING = """\
@@ -76,11 +80,11 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
         "# Head poses",
         summary,
         f"Images: {images}.",
-        "## Licences\n\n" + _licences(heads),
+        "## Licences\n\n" + licences_text(heads),
         "## Reading\n\n" + _READING.rstrip(),
-        "## Columns of data/\n\n" + _table(("column", "meaning"), _COLUMNS),
+        "## Columns of data/\n\n" + markdown_table(("column", "meaning"), COLUMNS),
         other_tables,
-        "## Conventions\n\n" + _table(("what", "definition"), tuple(CONVENTIONS.items())),
+        "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(CONVENTIONS.items())),
     ]
     return "\n\n".join(sections) + "\n"
 
@@ -102,13 +106,14 @@ def _front_matter(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
     return "\n".join(lines)
 
 
-def _licences(heads: Sequence[HeadRow]) -> str:
+def licences_text(heads: Sequence[HeadRow]) -> str:
+    """Sources and licences of heads as a table in Markdown, and a warning where some may not be published."""
     counts = Counter((head.source, head.license, head.redistributable, head.attribution) for head in heads)
     rows = [
         (source, str(count), license_, "yes" if redistributable else "**no**", attribution)
         for (source, license_, redistributable, attribution), count in sorted(counts.items())
     ]
-    text = _table(("source", "heads", "licence", "images may be published", "attribution"), rows)
+    text = markdown_table(("source", "heads", "licence", "images may be published", "attribution"), rows)
     if not all(head.redistributable for head in heads):
         text += (
             "\n\n**Do not publish this dataset as it is**: rows with `redistributable = false` "
@@ -117,7 +122,8 @@ def _licences(heads: Sequence[HeadRow]) -> str:
     return text
 
 
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
 

@@ -13,8 +13,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from generator.dataset.files import one_line, write_atomically
-from generator.dataset.schema import SCHEMA_VERSION, check_schema_version
+from generator.dataset.schema import LANDMARKS, SCHEMA_VERSION, check_schema_version
 from generator.errors import DatasetError
+from generator.geometry.camera import Camera, Projection
 
 HEADS_FILE = "heads.parquet"
 IDENTITY = tuple(np.eye(3).reshape(-1).tolist())
@@ -30,7 +31,18 @@ class HeadRow:
     pivot: centre of the rotation in the mesh's own units and axes.
     radius_mm: of the sphere about the pivot that holds the face.
     distance_mm, lens_mm: camera to pivot, and focal length on a 36 mm sensor.
-    correction: rotation applied before the pose, row-major in frame U; identity for frame = "source".
+    projection: "perspective" or "orthographic".
+    frame: where pose zero is, "source" (the mesh's own axes) or "canonical" (levelled).
+    correction: R_U, row-major, that turns the mesh from its own axes (after up and forward) to
+        the canonical pose zero; it was applied only where frame is "canonical".
+    correction_sd_deg: how sure it is, about the axes of yaw, pitch and roll; NaN where no face was found.
+    anchor_views: detections that the anchors are the mean of. anchor_off: points that fell off
+        the silhouette and lie on the nearest surface. anchor_absent: points without an anchor,
+        NaN in landmarks_exact.
+    anchor_residual_px: root mean square distance of the detections from the projected anchors, in
+        pixels of views 384 wide. anchor_residual_mm: median distance on the surface.
+        anchor_asymmetry_mm: rms distance of each anchor from the mirror image of its partner.
+        NaN without anchors.
     problems: what was wrong but did not stop the head from being built.
     """
 
@@ -53,8 +65,21 @@ class HeadRow:
     vertices: int
     triangles: int
     split: str
+    projection: Projection = "perspective"
+    frame: str = "source"
     correction: tuple[float, ...] = IDENTITY
+    correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
+    anchor_views: int = 0
+    anchor_off: int = 0
+    anchor_absent: int = LANDMARKS
+    anchor_residual_px: float = float("nan")
+    anchor_residual_mm: float = float("nan")
+    anchor_asymmetry_mm: float = float("nan")
     problems: tuple[str, ...] = ()
+
+    def camera(self, resolution: int) -> Camera:
+        """The camera that saw this head."""
+        return Camera(resolution, self.lens_mm, self.distance_mm, self.projection)
 
 
 def _list(kind: pa.DataType, size: int = -1) -> pa.DataType:
@@ -85,7 +110,16 @@ HEADS_SCHEMA = pa.schema(
             ("radius_mm", pa.float64()),
             ("distance_mm", pa.float64()),
             ("lens_mm", pa.float64()),
+            ("projection", pa.string()),
+            ("frame", pa.string()),
             ("correction", _list(pa.float64(), 9)),
+            ("correction_sd_deg", _list(pa.float64(), 3)),
+            ("anchor_views", pa.int32()),
+            ("anchor_off", pa.int32()),
+            ("anchor_absent", pa.int32()),
+            ("anchor_residual_px", pa.float64()),
+            ("anchor_residual_mm", pa.float64()),
+            ("anchor_asymmetry_mm", pa.float64()),
             ("vertices", pa.int32()),
             ("triangles", pa.int32()),
             ("problems", _list(pa.string())),
@@ -138,5 +172,5 @@ def _as_dict(head: HeadRow) -> dict[str, Any]:
 
 def _from_dict(values: dict[str, Any]) -> HeadRow:
     files = tuple((file["path"], file["sha256"]) for file in values["file_sha256"])
-    lists = {name: tuple(values[name]) for name in ("pivot", "correction", "problems")}
+    lists = {name: tuple(values[name]) for name in ("pivot", "correction", "correction_sd_deg", "problems")}
     return HeadRow(**{**values, **lists, "file_sha256": files})

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, get_type_hints
 
+from generator.dataset.anchors_table import ANCHORS_FILE
 from generator.dataset.digest import add_digests
 from generator.dataset.files import file_sha256, one_line, write_bytes
 from generator.dataset.heads_table import HEADS_FILE
@@ -34,7 +35,7 @@ class Manifest:
         why, and how many units failed and are recorded in failures.jsonl.
     created_by: the command line, for people; the only field that may differ
         between two builds of the same configuration.
-    tables: SHA-256 of heads.parquet and poses.csv; :func:`write_manifest` fills it in.
+    tables: SHA-256 of heads.parquet, anchors.parquet and poses.csv; :func:`write_manifest` fills it in.
     """
 
     versions: dict[str, str]
@@ -96,6 +97,11 @@ def configuration_digest(configuration: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def common_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """What all parts of a dataset share: its configuration without heads and poses, which may grow."""
+    return {name: section for name, section in configuration.items() if name not in ("heads", "poses")}
+
+
 def portable_command(arguments: Sequence[str]) -> str:
     """A command line without the folders of the machine it ran on: "/home/x/a.toml" becomes "a.toml"."""
     return " ".join(_without_folder(argument) for argument in arguments)
@@ -104,10 +110,10 @@ def portable_command(arguments: Sequence[str]) -> str:
 def write_manifest(manifest: Manifest, root: Path) -> None:
     """Write manifest.json atomically, as the last file of a dataset.
 
-    Raises DatasetError: heads.parquet or poses.csv is not there, or it cannot write.
+    Raises DatasetError: heads.parquet, anchors.parquet or poses.csv is not there, or it cannot write.
     """
     try:
-        tables = {name: file_sha256(root / name) for name in (HEADS_FILE, POSES_FILE)}
+        tables = {name: file_sha256(root / name) for name in (HEADS_FILE, ANCHORS_FILE, POSES_FILE)}
     except OSError as error:
         raise DatasetError(
             f"{error.filename}: cannot be read ({error.strerror}); write it before the manifest"

@@ -12,11 +12,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
 
-from generator.dataset.files import one_line
 from generator.dataset.manifest import Manifest
 from generator.dataset.part import BATCH, PartInfo
 from generator.dataset.schema import LANDMARK_COLUMNS
 from generator.errors import DatasetError
+
+OPEN_PARTS = 64
 
 
 def read_rows(
@@ -29,13 +30,16 @@ def read_rows(
 
     Raises DatasetError: a part is missing or damaged.
     """
-    if not parts:
-        return
     try:
-        data = ds.dataset([str(root / part.path) for part in parts], format="parquet")
-        yield from data.to_batches(columns=columns, filter=where, batch_size=BATCH)
+        # A dataset keeps the footers of all its files, 100 kB each, so it is opened piece by piece.
+        for start in range(0, len(parts), OPEN_PARTS):
+            paths = [str(root / part.path) for part in parts[start : start + OPEN_PARTS]]
+            data = ds.dataset(paths, format="parquet")
+            yield from data.to_batches(columns=columns, filter=where, batch_size=BATCH)
     except (OSError, pa.ArrowException) as error:
-        raise DatasetError(f"{root}: {one_line(error)}; `headturn verify` says what is wrong") from error
+        # The whole message on one line: its first sentence does not name the file.
+        what = " ".join(str(error).split())
+        raise DatasetError(f"{root}: {what}; `headturn verify` says what is wrong") from error
 
 
 def as_array(table: pa.Table | pa.RecordBatch, name: str) -> np.ndarray:

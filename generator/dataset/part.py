@@ -16,13 +16,14 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from generator.dataset.digest import NO_ROWS, add_digests, content_digest
-from generator.dataset.files import file_sha256, one_line, write_atomically, write_bytes
+from generator.dataset.files import file_sha256, one_line, write_atomically, write_files
 from generator.dataset.schema import (
     LANDMARK_COLUMNS,
     LANDMARKS,
     check_name,
     image_mode,
     image_path,
+    passes_path,
     sample_id,
 )
 from generator.errors import DatasetError
@@ -31,6 +32,8 @@ from generator.geometry.rotation import quaternion_from_rotation, rotation_from_
 from generator.plan.poses import ANGLES, pose_name
 
 NUMPY_TYPES = {pa.float64(): np.float64, pa.float32(): np.float32, pa.bool_(): np.bool_}
+"""Of list elements. (pyarrow's own mapping needs pandas, which a build does not.)"""
+
 ROW_GROUP = 1024
 BATCH = 256
 """Rows read at once: bounds the memory of a check when images are embedded."""
@@ -44,7 +47,12 @@ class UnitRows:
     camera         the camera of every row
     detected       bool [N]
     landmarks      float32 [N, 468, 3], isotropic pixels, frame C; NaN where not detected
+    anchors        float64 [468, 3], the points on the mesh at pose zero, frame C, mm, pivot at
+                   the origin; NaN where the head has none
+    visible        bool [N, 468], False where there is no anchor
     images         N encoded image files; image_suffix is theirs, such as ".png"
+    passes         N multilayer OpenEXR files and the SHA-256 of their decoded floats; None
+                   where no passes were asked for
     """
 
     subject: str
@@ -57,8 +65,11 @@ class UnitRows:
     camera: Camera
     detected: np.ndarray
     landmarks: np.ndarray
+    anchors: np.ndarray
+    visible: np.ndarray
     images: Sequence[bytes]
     image_suffix: str = ".png"
+    passes: Sequence[tuple[bytes, str]] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.angles_deg)
@@ -67,6 +78,8 @@ class UnitRows:
             "indices": (self.indices.shape, (count, 3)),
             "detected": (self.detected.shape, (count,)),
             "landmarks": (self.landmarks.shape, (count, LANDMARKS, 3)),
+            "anchors": (self.anchors.shape, (LANDMARKS, 3)),
+            "visible": (self.visible.shape, (count, LANDMARKS)),
             "images": ((len(self.images),), (count,)),
         }
         for name, (actual, expected) in shapes.items():
@@ -76,6 +89,13 @@ class UnitRows:
         missing = np.isnan(self.landmarks).all(axis=(1, 2))
         if not np.where(self.detected, finite, missing).all():
             raise ValueError("landmarks must be finite where detected and all NaN where not")
+        anchored = np.isfinite(self.anchors).all(axis=1)
+        if not np.where(anchored, True, np.isnan(self.anchors).all(axis=1)).all():
+            raise ValueError("an anchor must be finite or all NaN")
+        if self.visible[:, ~anchored].any():
+            raise ValueError("a point without an anchor cannot be visible")
+        if self.passes is not None and len(self.passes) != count:
+            raise ValueError(f"passes: expected {count}, got {len(self.passes)}")
         for what in ("subject", "expression", "split"):
             check_name(what, getattr(self, what))
 
@@ -88,6 +108,20 @@ class UnitRows:
     def image_paths(self) -> list[str]:
         """Where each image is stored with images = "files", relative to the dataset."""
         return [image_path(self.subject, self.expression, pose, self.image_suffix) for pose in self.poses]
+
+    @property
+    def passes_paths(self) -> list[str]:
+        """Where the passes of each image are stored, relative to the dataset; "" without passes."""
+        if self.passes is None:
+            return [""] * len(self.angles_deg)
+        return [passes_path(self.subject, self.expression, pose) for pose in self.poses]
+
+    @property
+    def landmarks_exact(self) -> np.ndarray:
+        """R_C X + t of the anchors X, float32 [N, 468, 3], frame C, mm."""
+        rotation = rotation_from_angles(self.angles_deg)
+        points = self.anchors @ np.swapaxes(rotation, -1, -2) + self.camera.translation_mm
+        return points.astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -122,6 +156,7 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
         "redistributable": rows.redistributable,
         "camera": rows.camera.matrix,
         "translation_mm": rows.camera.translation_mm,
+        "projection": rows.camera.projection,
         "width": rows.camera.resolution,
         "height": rows.camera.resolution,
     }
@@ -132,8 +167,12 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
         "quaternion": quaternion_from_rotation(rotation),
         "detected": rows.detected,
         "landmarks": rows.landmarks,
+        "landmarks_exact": rows.landmarks_exact,
+        "landmarks_visible": rows.visible,
         "image_path": rows.image_paths if mode == "files" else [""] * count,
         "image_sha256": [hashlib.sha256(image).hexdigest() for image in rows.images],
+        "passes_path": rows.passes_paths,
+        "passes_sha256": [digest for _, digest in rows.passes] if rows.passes else [""] * count,
     }
     for axis, angle in enumerate(ANGLES):
         values[f"{angle}_deg"] = rows.angles_deg[:, axis]
@@ -165,18 +204,21 @@ def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
             raise DatasetError(f"{path}: what was read back differs from what was written; check the disk")
         return replace(info, path=f"data/{split}/{path.name}")
 
-    return write_atomically(path, lambda file: _write_table(table, file), check)
+    return write_atomically(path, lambda file: write_table(table, file), check)
 
 
 def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> PartInfo:
-    """Store one unit: its image files where images = "files", then its part.
+    """Store one unit: its image files where images = "files", its passes, then its part.
 
     Raises DatasetError as :func:`write_part` does; then the part is not there.
     """
     table = unit_table(rows, schema)
     if image_mode(schema) == "files":
-        for relative, image in zip(rows.image_paths, rows.images, strict=True):
-            write_bytes(root / relative, image)
+        # The part that vouches for them comes last, so they need no rename of their own.
+        write_files({root / path: image for path, image in zip(rows.image_paths, rows.images, strict=True)})
+    if rows.passes is not None:
+        files = zip(rows.passes_paths, rows.passes, strict=True)
+        write_files({root / path: content for path, (content, _) in files})
     return write_part(table, root, rows.split, unit)
 
 
@@ -245,15 +287,21 @@ def _column(values: Any, kind: pa.DataType) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind)
 
 
-def _write_table(table: pa.Table, file: BinaryIO) -> None:
-    lists = [field.name for field in table.schema if pa.types.is_nested(field.type)]
-    scalars = [name for name in table.schema.names if name not in lists]
-    pq.write_table(
-        table,
+def write_table(table: pa.Table, file: BinaryIO) -> None:
+    """Write rows as Parquet the way every part is: zstd, page checksums, landmarks split by byte."""
+    with part_writer(file, table.schema) as writer:
+        writer.write_table(table, row_group_size=ROW_GROUP)
+
+
+def part_writer(file: BinaryIO, schema: pa.Schema) -> pq.ParquetWriter:
+    """A writer for rows that come piece by piece; see :func:`write_table`."""
+    lists = [field.name for field in schema if pa.types.is_nested(field.type)]
+    scalars = [name for name in schema.names if name not in lists]
+    return pq.ParquetWriter(
         file,
-        row_group_size=ROW_GROUP,
+        schema,
         compression="zstd",
-        use_dictionary=[name for name in scalars if pa.types.is_string(table.schema.field(name).type)],
+        use_dictionary=[name for name in scalars if pa.types.is_string(schema.field(name).type)],
         use_byte_stream_split=[f"{name}.list.element" for name in LANDMARK_COLUMNS],
         write_statistics=scalars,
         write_page_index=True,

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two pictures that show a dataset at a glance: a contact sheet and a map of the detector."""
+"""Pictures that show a dataset at a glance: contact sheets and a map of the detector."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont, UnidentifiedImageError
 
 from generator.dataset.detection import tally_detection
 from generator.dataset.files import write_bytes
-from generator.dataset.heads_table import read_heads
+from generator.dataset.heads_table import HeadRow, read_heads
 from generator.dataset.manifest import POSES_FILE, Manifest
 from generator.dataset.open import image_bytes, read_samples
 from generator.dataset.schema import LANDMARKS, sample_id
@@ -19,7 +20,7 @@ from generator.errors import DatasetError
 from generator.plan.poses import ANGLES, PosePlan, csv_plan, pose_name
 
 SHEET_HEADS = 6
-TILE, GAP, TOP, LEFT = 168, 8, 40, 132
+TILE, ANCHOR_TILE, GAP, TOP, LEFT = 168, 224, 8, 40, 132
 PAPER, INK, FAINT, DOT, MISS = "#fafafa", "#222222", "#777777", "#19e3b1", "#d7263d"
 
 # Where the shown poses lie in the range of (yaw, pitch, roll): -1, 0, 1 are its ends and its middle.
@@ -34,33 +35,60 @@ def contact_sheet(dataset: Path, manifest: Manifest, out: Path) -> Path:
     Heads, poses.csv and the parts must be there; the manifest may not be written yet. Returns out.
     Raises DatasetError: the dataset has no images, or lacks a file.
     """
+    return _sheet(dataset, manifest, out, TILE, _mark_detected, lambda head: head.expression)
+
+
+def anchor_sheet(dataset: Path, manifest: Manifest, out: Path) -> Path:
+    """As :func:`contact_sheet`, with the exact landmarks: seen ones green, hidden ones red.
+
+    Beside each head: rms distance of the detections from its anchors, and points without one.
+    """
+
+    def quality(head: HeadRow) -> str:
+        lost = f", {head.anchor_absent} absent" if head.anchor_absent else ""
+        return f"{head.anchor_residual_px:.1f} px{lost}" if head.anchor_views else "no anchors"
+
+    return _sheet(dataset, manifest, out, ANCHOR_TILE, _mark_exact, quality)
+
+
+def _sheet(
+    dataset: Path,
+    manifest: Manifest,
+    out: Path,
+    side: int,
+    mark: Callable[[ImageDraw.ImageDraw, dict, HeadRow, int], None],
+    caption: Callable[[HeadRow], str],
+) -> Path:
+    """mark(draw, row, head, side) draws onto a tile of that side; caption stands below the subject."""
     if manifest.images == "none":
         raise DatasetError(
             f"{dataset}: built with images = none, so there is nothing to show; build with files or embedded"
         )
     heads, plan = read_heads(dataset), csv_plan(dataset / POSES_FILE)
     heads = [heads[i] for i in np.unique(np.linspace(0, len(heads) - 1, SHEET_HEADS).round().astype(int))]
-    poses = plan.angles_deg[_shown_poses(plan)].tolist()
+    poses = plan.angles_deg[shown_poses(plan)].tolist()
     names = [sample_id(h.subject, h.expression, pose_name(*pose)) for h in heads for pose in poses]
     rows = read_samples(dataset, manifest, names)
 
-    size = (LEFT + len(poses) * (TILE + GAP), TOP + len(heads) * (TILE + GAP))
+    size = (LEFT + len(poses) * (side + GAP), TOP + len(heads) * (side + GAP))
     sheet = Image.new("RGB", size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font, small = ImageFont.load_default(14), ImageFont.load_default(12)
     for column, pose in enumerate(poses):
         for place, (name, angle) in enumerate(zip(ANGLES, pose, strict=True)):
-            x = LEFT + column * (TILE + GAP) + TILE * (2 * place + 1) / 6
+            x = LEFT + column * (side + GAP) + side * (2 * place + 1) / 6
             draw.text((x, 12), name, FAINT, small, anchor="mm")
             draw.text((x, 28), f"{angle:.1f}".removesuffix(".0") + "°", INK, font, anchor="mm")
     for line, head in enumerate(heads):
-        top = TOP + line * (TILE + GAP)
-        draw.text((GAP, top + TILE / 2 - 10), _fit(draw, head.subject, font), INK, font, anchor="lm")
-        draw.text((GAP, top + TILE / 2 + 10), _fit(draw, head.expression, small), FAINT, small, anchor="lm")
+        top = TOP + line * (side + GAP)
+        draw.text((GAP, top + side / 2 - 10), _fit(draw, head.subject, font), INK, font, anchor="lm")
+        draw.text((GAP, top + side / 2 + 10), _fit(draw, caption(head), small), FAINT, small, anchor="lm")
         for column, pose in enumerate(poses):
             row = rows.get(sample_id(head.subject, head.expression, pose_name(*pose)))
             if row is not None:  # a unit that failed leaves an empty place
-                sheet.paste(_tile(dataset, row), (LEFT + column * (TILE + GAP), top))
+                tile = _picture(dataset, row, side)
+                mark(ImageDraw.Draw(tile), row, head, side)
+                sheet.paste(tile, (LEFT + column * (side + GAP), top))
     png = io.BytesIO()
     sheet.save(png, "PNG")
     write_bytes(out, png.getvalue())
@@ -105,7 +133,7 @@ def detection_map(dataset: Path, manifest: Manifest, out: Path) -> Path:
     return out
 
 
-def _shown_poses(plan: PosePlan) -> list[int]:
+def shown_poses(plan: PosePlan) -> list[int]:
     """The poses of the plan nearest to the ends and the middle of its range, each once."""
     low, high = plan.angles_deg.min(axis=0), plan.angles_deg.max(axis=0)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
@@ -114,23 +142,33 @@ def _shown_poses(plan: PosePlan) -> list[int]:
     return list(dict.fromkeys(nearest))
 
 
-def _tile(dataset: Path, row: dict) -> Image.Image:
+def _picture(dataset: Path, row: dict, side: int) -> Image.Image:
     try:
         picture = Image.open(io.BytesIO(image_bytes(dataset, row))).convert("RGB")
     except (UnidentifiedImageError, OSError) as error:
         raise DatasetError(
             f"{dataset}: the image of {row['sample_id']} cannot be decoded; see `headturn verify`"
         ) from error
-    tile = picture.resize((TILE, TILE), Image.Resampling.LANCZOS)
-    draw = ImageDraw.Draw(tile)
+    return picture.resize((side, side), Image.Resampling.LANCZOS)
+
+
+def _mark_detected(draw: ImageDraw.ImageDraw, row: dict, _: HeadRow, side: int) -> None:
     if row["detected"]:
-        points = np.array(row["landmarks"]).reshape(LANDMARKS, 3)[:, :2] * TILE / row["width"]
+        points = np.array(row["landmarks"]).reshape(LANDMARKS, 3)[:, :2] * side / row["width"]
         draw.point([tuple(point) for point in points.tolist()], DOT)
     else:
-        draw.rectangle((0, 0, TILE - 1, TILE - 1), outline=MISS, width=3)
-        draw.rectangle((0, TILE - 22, TILE, TILE), fill=MISS)
-        draw.text((TILE / 2, TILE - 11), "not detected", "white", ImageFont.load_default(13), anchor="mm")
-    return tile
+        draw.rectangle((0, 0, side - 1, side - 1), outline=MISS, width=3)
+        draw.rectangle((0, side - 22, side, side), fill=MISS)
+        draw.text((side / 2, side - 11), "not detected", "white", ImageFont.load_default(13), anchor="mm")
+
+
+def _mark_exact(draw: ImageDraw.ImageDraw, row: dict, head: HeadRow, side: int) -> None:
+    points = np.array(row["landmarks_exact"]).reshape(LANDMARKS, 3)
+    visible = np.array(row["landmarks_visible"])
+    anchored = np.isfinite(points).all(axis=1)
+    pixels = head.camera(side).project(points[anchored])
+    for seen, color in ((False, MISS), (True, DOT)):
+        draw.point([tuple(point) for point in pixels[visible[anchored] == seen].tolist()], color)
 
 
 def _fit(draw: ImageDraw.ImageDraw, text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont) -> str:

@@ -14,7 +14,6 @@ from generator.dataset.files import file_sha256
 from generator.dataset.heads_table import HeadRow
 from generator.dataset.open import as_array
 from generator.dataset.schema import ImageMode, image_path, sample_id
-from generator.geometry.camera import Camera
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 from generator.plan.poses import ANGLES, PosePlan
 
@@ -63,30 +62,33 @@ def rotation_problems(batch: pa.RecordBatch) -> Problems:
     exact = quaternion_from_rotation(expected)
     # At w = 0 both signs are the same rotation and w >= 0 does not choose.
     turned = _far(quaternion, exact) & _far(-quaternion, exact) | (quaternion[:, 0] < 0)
-    yield from _named(batch, ~finite, "an angle is not finite")
-    yield from _named(batch, finite & matrix, "rotation does not agree with the angles")
-    yield from _named(batch, finite & turned, "quaternion does not agree with the angles")
+    yield from named(batch, ~finite, "an angle is not finite")
+    yield from named(batch, finite & matrix, "rotation does not agree with the angles")
+    yield from named(batch, finite & turned, "quaternion does not agree with the angles")
 
 
 def camera_problems(batch: pa.RecordBatch, heads: Sequence[HeadRow], head_index: np.ndarray) -> Problems:
-    """K and translation against the lens and distance of heads.parquet."""
+    """K, translation and projection against heads.parquet."""
     width, height = as_array(batch, "width"), as_array(batch, "height")
     pairs, pair_of_row = np.unique(np.stack([width, head_index]), axis=1, return_inverse=True)
-    cameras = [Camera(size, heads[i].lens_mm, heads[i].distance_mm) for size, i in pairs.T.tolist()]
+    cameras = [heads[i].camera(size) for size, i in pairs.T.tolist()]
     matrices = np.stack([camera.matrix.reshape(-1) for camera in cameras])[pair_of_row.ravel()]
     offsets = np.stack([camera.translation_mm for camera in cameras])[pair_of_row.ravel()]
-    yield from _named(batch, (width != height) | (width <= 0), "not the width and height of a square image")
+    yield from named(batch, (width != height) | (width <= 0), "not the width and height of a square image")
     for name, expected in (("camera", matrices), ("translation_mm", offsets)):
         wrong = _far(as_array(batch, name), expected, 1e-9)
-        yield from _named(batch, wrong, f"{name} differs from heads.parquet")
+        yield from named(batch, wrong, f"{name} differs from heads.parquet")
+    projections = batch.column("projection").to_pylist()
+    wrong = np.array([p != heads[i].projection for p, i in zip(projections, head_index, strict=True)])
+    yield from named(batch, wrong, "projection differs from heads.parquet")
 
 
 def landmark_problems(batch: pa.RecordBatch) -> Problems:
     """Finite where detected, all NaN where not."""
     landmarks, detected = as_array(batch, "landmarks"), as_array(batch, "detected").astype(bool)
     finite, missing = np.isfinite(landmarks).all(axis=(1, 2)), np.isnan(landmarks).all(axis=(1, 2))
-    yield from _named(batch, detected & ~finite, "detected, but a landmark is not finite")
-    yield from _named(batch, ~detected & ~missing, "not detected, but a landmark is not NaN")
+    yield from named(batch, detected & ~finite, "detected, but a landmark is not finite")
+    yield from named(batch, ~detected & ~missing, "not detected, but a landmark is not NaN")
 
 
 def image_problems(batch: pa.RecordBatch, mode: ImageMode, root: Path) -> Problems:
@@ -127,7 +129,8 @@ def _far(actual: np.ndarray, expected: np.ndarray, tolerance: float = TOLERANCE)
     return ~(np.abs(actual - expected) <= tolerance).all(axis=1)
 
 
-def _named(batch: pa.RecordBatch, wrong: np.ndarray, what: str) -> Problems:
+def named(batch: pa.RecordBatch, wrong: np.ndarray, what: str) -> Problems:
+    """One problem a row that is wrong, with its sample_id. wrong: bool [N]."""
     if wrong.any():
         names = batch.column("sample_id")
         for row in np.flatnonzero(wrong).tolist():

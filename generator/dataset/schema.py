@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from generator.errors import DatasetError
 
-SCHEMA_VERSION = "1.0.0"
+SCHEMA_VERSION = "1.1.0"
 LANDMARK_TOPOLOGY = "mediapipe-face-mesh-468"
 LANDMARKS = 468
 
@@ -30,6 +30,9 @@ CONVENTIONS = {
     "camera": "K, row-major, pixels; the centre of the first pixel is (0.5, 0.5)",
     "translation": "the pivot of the rotation in frame C, mm",
     "landmarks": "468 x (x, y, z) in isotropic pixels, frame C; NaN where detected is false",
+    "landmarks_exact": "the same points on the mesh, R_C X + t, frame C, mm; NaN where a head has no anchor",
+    "landmarks_visible": "is the exact landmark inside the image and nothing of the head in front of it?",
+    "projection": "of (X, Y, Z) in frame C: perspective K (X/Z, Y/Z, 1); orthographic K (X/t_z, Y/t_z, 1)",
 }
 
 
@@ -54,19 +57,24 @@ _COLUMNS: tuple[tuple[str, pa.DataType], ...] = (
     ("quaternion", _list(pa.float64(), 4)),
     ("camera", _list(pa.float64(), 9)),
     ("translation_mm", _list(pa.float64(), 3)),
+    ("projection", pa.string()),
     ("detected", pa.bool_()),
     ("landmarks", _list(pa.float32(), LANDMARKS * 3)),
+    ("landmarks_exact", _list(pa.float32(), LANDMARKS * 3)),
+    ("landmarks_visible", _list(pa.bool_(), LANDMARKS)),
     ("width", pa.int32()),
     ("height", pa.int32()),
     ("image_path", pa.string()),
     ("image_sha256", pa.string()),
+    ("passes_path", pa.string()),
+    ("passes_sha256", pa.string()),
 )
 
 # Nullable by declaration only (verify proves there are none): Hugging Face
 # datasets takes a struct for an image only if its fields may be null.
 IMAGE_FIELD = pa.field("image", pa.struct([("bytes", pa.binary()), ("path", pa.string())]))
 
-LANDMARK_COLUMNS = ("landmarks",)
+LANDMARK_COLUMNS = ("landmarks", "landmarks_exact")
 """Columns of incompressible floats, stored with BYTE_STREAM_SPLIT."""
 
 
@@ -74,7 +82,7 @@ def part_schema(images: ImageMode, versions: Mapping[str, str], configuration_di
     """Schema of one part: columns in order, none nullable, and the metadata.
 
     versions: name and version of every package that decides the content.
-    configuration_digest: :func:`generator.dataset.manifest.configuration_digest`.
+    configuration_digest: of :func:`generator.dataset.manifest.common_configuration`.
     """
     fields = [pa.field(name, kind, nullable=False) for name, kind in _COLUMNS]
     metadata = {
@@ -97,11 +105,12 @@ def image_mode(schema: pa.Schema) -> str:
 
 
 def check_schema_version(version: str, where: str) -> None:
-    """Raises DatasetError unless this program reads that version (same major number)."""
-    if version.split(".")[0] != SCHEMA_VERSION.split(".")[0]:
+    """Raises DatasetError unless this program reads that version (same major and minor number)."""
+    expected = SCHEMA_VERSION.rpartition(".")[0]
+    if version.rpartition(".")[0] != expected:
         raise DatasetError(
-            f"{where}: schema version {version!r}, expected {SCHEMA_VERSION.split('.')[0]}.x; "
-            "read it with the version of Headturn that wrote it"
+            f"{where}: schema version {version!r}, expected {expected}.x; build it again from its "
+            "config.toml into another folder, or read it with the version of Headturn that wrote it"
         )
 
 
@@ -122,6 +131,11 @@ def sample_id(subject: str, expression: str, pose: str) -> str:
 def image_path(subject: str, expression: str, pose: str, suffix: str) -> str:
     """Where an image is stored with images = "files", relative to the dataset. suffix: ".png"."""
     return f"images/{subject}/{expression}/{pose}{suffix}"
+
+
+def passes_path(subject: str, expression: str, pose: str) -> str:
+    """Where the passes of an image are stored, relative to the dataset."""
+    return f"exr/{subject}/{expression}/{pose}.exr"
 
 
 def _json(value: object) -> str:

@@ -11,13 +11,22 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.anchors_table import ANCHORS_FILE, HeadAnchors, read_anchors
 from generator.dataset.detection import Cell, DetectionTally
 from generator.dataset.digest import add_digests, content_digest
+from generator.dataset.exact_checks import anchor_problems, exact_problems
 from generator.dataset.files import file_sha256
 from generator.dataset.heads_table import HEADS_FILE, HeadRow, read_heads
-from generator.dataset.manifest import POSES_FILE, Manifest, configuration_digest, read_manifest
+from generator.dataset.manifest import (
+    POSES_FILE,
+    Manifest,
+    common_configuration,
+    configuration_digest,
+    read_manifest,
+)
 from generator.dataset.open import as_array
 from generator.dataset.part import PartInfo, iter_part, part_schema_of
+from generator.dataset.pass_checks import pass_problems
 from generator.dataset.row_checks import (
     camera_problems,
     identity_problems,
@@ -25,7 +34,7 @@ from generator.dataset.row_checks import (
     landmark_problems,
     rotation_problems,
 )
-from generator.dataset.schema import LANDMARK_TOPOLOGY, SCHEMA_VERSION, part_schema
+from generator.dataset.schema import LANDMARK_TOPOLOGY, LANDMARKS, SCHEMA_VERSION, part_schema
 from generator.errors import DatasetError, HeadturnError
 from generator.plan.poses import PosePlan, csv_plan, pose_name
 
@@ -48,7 +57,10 @@ CHECKS = (
     "rotation",
     "camera",
     "landmarks",
+    "anchors",
+    "exact landmarks",
     "images",
+    "passes",
     "digest",
 )
 
@@ -85,7 +97,10 @@ class Check:
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """What was checked and what was counted. Rates are shares of 1; NaN without rows."""
+    """What was checked and what was counted. Rates are shares of 1; NaN without rows.
+
+    closure_deg: the largest angle between R_C and the rigid fit of landmarks_exact.
+    """
 
     checks: tuple[Check, ...]
     heads: int = 0
@@ -93,6 +108,7 @@ class VerifyReport:
     rows: int = 0
     detected_rows: int = 0
     detection_rate: float = float("nan")
+    closure_deg: float = 0.0
     rate_by_subject: dict[str, float] = field(default_factory=dict)
     cells: tuple[Cell, ...] = ()
 
@@ -121,6 +137,7 @@ class VerifyReport:
                 f"{self.rows} rows of {self.heads} heads x {self.poses} poses; "
                 f"a face was found in {self.detection_rate:.1%}"
             )
+            lines.append(f"exact landmarks give R_C back to {self.closure_deg:.1g}°")
             lines += [
                 f"  yaw {cell.yaw_deg:+g}, pitch {cell.pitch_deg:+g}: {cell.rate:.0%} of {cell.rows}"
                 for cell in self.worst_cells
@@ -138,6 +155,7 @@ class VerifyReport:
             "rows": self.rows,
             "detected_rows": self.detected_rows,
             "detection_rate": self.detection_rate if self.rows else None,
+            "closure_deg": self.closure_deg,
             "rate_by_subject": self.rate_by_subject,
             "cells": [{**asdict(cell), "rate": cell.rate} for cell in self.cells],
         }
@@ -160,13 +178,15 @@ def verify_dataset(path: Path, *, progress: Callable[[int, int], None] | None = 
     checks["manifest"].done = True
     try:
         heads, plan = read_heads(root), csv_plan(root / POSES_FILE)
-        tables = (HEADS_FILE, POSES_FILE)
+        anchors = read_anchors(root)
+        tables = (HEADS_FILE, ANCHORS_FILE, POSES_FILE)
         changed = [name for name in tables if file_sha256(root / name) != manifest.tables.get(name)]
     except (OSError, HeadturnError) as error:
         checks["heads and poses"].add([str(error)])
         return report
     checks["heads and poses"].add(f"{name} was changed after the build (SHA-256 differs)" for name in changed)
-    run = _Run(root, manifest, heads, plan, checks)
+    checks["anchors"].add(anchor_problems(heads, anchors))
+    run = _Run(root, manifest, heads, plan, anchors, checks)
     for check in checks.values():
         check.done = True
     for done, part in enumerate(run.present_parts(), start=1):
@@ -182,6 +202,7 @@ def verify_dataset(path: Path, *, progress: Callable[[int, int], None] | None = 
         rows=run.rows,
         detected_rows=int(tally.detected.sum(dtype=np.int64)),
         detection_rate=tally.rate,
+        closure_deg=run.closure_deg,
         rate_by_subject=tally.by_subject(),
         cells=tuple(tally.by_cell()),
     )
@@ -191,12 +212,23 @@ class _Run:
     """One pass over the parts of a dataset."""
 
     def __init__(
-        self, root: Path, manifest: Manifest, heads: list[HeadRow], plan: PosePlan, checks: dict[str, Check]
+        self,
+        root: Path,
+        manifest: Manifest,
+        heads: list[HeadRow],
+        plan: PosePlan,
+        anchors: dict[tuple[str, str], HeadAnchors],
+        checks: dict[str, Check],
     ) -> None:
         self.root, self.manifest, self.heads, self.plan, self.checks = root, manifest, heads, plan, checks
         self.tally = DetectionTally(heads, plan)
         self.names = [pose_name(*pose) for pose in plan.angles_deg.tolist()]
+        self.points = np.full((len(heads), LANDMARKS, 3), np.nan)
+        for place, head in enumerate(heads):
+            if found := anchors.get((head.subject, head.expression)):
+                self.points[place] = found.points
         self.rows = 0
+        self.closure_deg = 0.0
         self.digests: list[str] = []
         self.metadata = {
             key.encode(): value.encode()
@@ -204,7 +236,10 @@ class _Run:
                 ("headturn.schema_version", manifest.schema_version),
                 ("headturn.landmark_topology", LANDMARK_TOPOLOGY),
                 ("headturn.images", manifest.images),
-                ("headturn.configuration_digest", configuration_digest(manifest.configuration)),
+                (
+                    "headturn.configuration_digest",
+                    configuration_digest(common_configuration(manifest.configuration)),
+                ),
             )
         }
 
@@ -282,7 +317,11 @@ class _Run:
         add["rotation"].add(rotation_problems(batch))
         add["camera"].add(camera_problems(batch, self.heads, heads))
         add["landmarks"].add(landmark_problems(batch))
+        problems, closure = exact_problems(batch, self.heads, heads, self.points)
+        add["exact landmarks"].add(problems)
+        self.closure_deg = max(self.closure_deg, closure)
         add["images"].add(image_problems(batch, self.manifest.images, self.root))
+        add["passes"].add(pass_problems(batch, self.heads, heads, self.root))
 
     def _schema_problems(self, schema: pa.Schema) -> list[str]:
         metadata = schema.metadata or {}

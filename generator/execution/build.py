@@ -4,50 +4,60 @@
 from __future__ import annotations
 
 import json
-import os
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from generator import __version__
+from generator.dataset.anchors_table import write_anchors
 from generator.dataset.card import write_card
 from generator.dataset.files import file_sha256, write_bytes
-from generator.dataset.heads_table import HeadRow, write_heads
+from generator.dataset.heads_table import write_heads
 from generator.dataset.manifest import (
     MANIFEST_FILE,
+    POSES_FILE,
     Manifest,
+    common_configuration,
     configuration_digest,
     read_manifest,
     write_manifest,
 )
-from generator.dataset.part import PartInfo, check_part
-from generator.dataset.pictures import contact_sheet, detection_map
-from generator.errors import DatasetError, HeadError, UsageError
+from generator.dataset.part import PartInfo
+from generator.dataset.pictures import anchor_sheet, contact_sheet, detection_map
+from generator.errors import DatasetError, HeadError
+from generator.execution.chunks import assign_chunks, cut, read_earlier
 from generator.execution.executor import Executor
+from generator.execution.extend import carry_over, earlier_parts
+from generator.execution.folder import (
+    ANCHOR_SHEET_FILE,
+    FAILURES_FILE,
+    MAP_FILE,
+    SHEET_FILE,
+    Confirm,
+    ask_to_drop,
+    begin,
+    check_configuration,
+    claim,
+    drop,
+    mark,
+    spare_skipped,
+    stale_parts,
+    start_over,
+)
+from generator.execution.head_rows import head_anchors, head_row, relative
 from generator.execution.lane import head_to_json
+from generator.execution.lock import locked
 from generator.execution.prepare import Prepared
+from generator.execution.prepared_heads import PreparedHeads, lane_versions
+from generator.execution.receipts import Receipts, split_done
+from generator.execution.sources import find_source
+from generator.execution.status import LoggingReporter, Reporter
 from generator.execution.units import PlannedHead, assign_split, camera_distance, plan_units
 from generator.heads.head import NEUTRAL, Head, HeadSource, SkippedHead
-from generator.heads.parametric.make import make_heads
-from generator.heads.source import find_heads
-from generator.plan.config import PARAMETRIC, BuildConfig, Heads, differences, load_config, save_config
-from generator.plan.poses import PosePlan, write_poses_csv
-
-CONFIG_FILE, POSES_FILE, FAILURES_FILE = "config.toml", "poses.csv", "failures.jsonl"
-MADE_HEADS = "heads"
-
-
-class Reporter(Protocol):
-    """Where a build says what it is doing."""
-
-    def stage(self, name: str, total: int) -> None:
-        """A stage begins; total steps follow."""
-
-    def advance(self, steps: int = 1) -> None:
-        """Steps of the current stage are done. May be called from any thread."""
-
-    def note(self, text: str) -> None:
-        """One line that should be read."""
+from generator.landmarks.anchors import Anchors
+from generator.plan.config import BuildConfig
+from generator.plan.poses import PosePlan
 
 
 @dataclass
@@ -75,33 +85,78 @@ def build(
     reporter: Reporter,
     *,
     command: str = "",
+    fresh: bool = False,
+    confirm: Confirm = lambda what: False,
 ) -> BuildResult:
-    """Build, or finish, the dataset of config in the folder root.
+    """Build, finish or extend the dataset of config in the folder root.
 
     Parameters
     ----------
     executor: carries out the orders; closed by the caller.
     command: the command line, recorded in the manifest.
+    fresh: delete the dataset that is there first.
+    confirm: asked before anything is deleted that may be missed; by default it is not.
 
     Raises
     ------
     UsageError: the configuration makes no sense, or no head can be built.
-    DatasetError: root holds something else, or cannot be written.
+    DatasetError: root holds something else, another build is at work there, it
+        cannot be written, or confirm said no.
     """
+    root = root.absolute()
     plan = config.poses.plan()
-    open_dataset(config, plan, root)
+    claim(root)
+    with locked(root):
+        if fresh:
+            start_over(root, confirm)
+        if not check_configuration(config, root):
+            mark(config, root)
+        with LoggingReporter(reporter, root) as logged:
+            logged.log(f"headturn {__version__}: {executor.name}, {executor.workers} workers; {command}")
+            return _build(config, plan, root, executor, logged, command, confirm)
+
+
+def _build(
+    config: BuildConfig,
+    plan: PosePlan,
+    root: Path,
+    executor: Executor,
+    reporter: Reporter,
+    command: str,
+    confirm: Confirm,
+) -> BuildResult:
     source = find_source(config.heads, root, reporter)
-    planned, skipped, versions = prepare_heads(source, config, executor, reporter)
-    digest = configuration_digest(config.as_dict())
-    orders = plan_units(planned, plan, config, root=root, configuration_digest=digest, versions=versions)
-    done, todo = split_done(orders, root)
+    planned, skipped, versions = prepare_heads(source, config, root, executor, reporter)
+    earlier = read_earlier(root / POSES_FILE)
+    chunks = assign_chunks(plan, config.dataset.unit_size, earlier)
+    digest = configuration_digest(common_configuration(config.as_dict()))
+    orders = plan_units(
+        planned,
+        cut(plan, chunks, earlier),
+        config,
+        root=root,
+        configuration_digest=digest,
+        versions=versions,
+    )
+    receipts = Receipts(root)
+    stale = stale_parts(root, orders)
+    spare_skipped(stale, skipped, receipts)
+    ask_to_drop([part for part in stale if part not in earlier_parts(orders)], root, confirm)
+    if carried := carry_over(orders, root, receipts):
+        reporter.note(f"the grid grew: {carried} parts got new indices without being rendered again")
+    begin(config, plan, chunks, root)
+    drop(stale, root, [(head.head.subject, head.head.expression) for head in planned], plan)
+    done, todo = split_done(orders, receipts)
     if done:
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")
 
     reporter.stage("rendering", sum(len(order["poses"]) for order in todo))
-    parts, failures, seconds = run_units(todo, executor, reporter)
+    parts, failures, seconds = run_units(todo, executor, receipts, reporter)
     write_lines(root / FAILURES_FILE, failures)
-    write_heads([_head_row(head, source, config) for head in planned], root)
+    write_heads(
+        [head_row(head, relative(head.head.mesh_path, source.path), config) for head in planned], root
+    )
+    write_anchors([head_anchors(head) for head in planned], root)
     manifest = Manifest(
         versions=versions,
         configuration=config.as_dict(),
@@ -117,80 +172,15 @@ def build(
     write_card(manifest, root)
     pictures = []
     if config.dataset.images != "none":
-        pictures.append(contact_sheet(root, manifest, root / "contact_sheet.png"))
-    pictures.append(detection_map(root, manifest, root / "detection_rate.png"))
+        pictures.append(contact_sheet(root, manifest, root / SHEET_FILE))
+        pictures.append(anchor_sheet(root, manifest, root / ANCHOR_SHEET_FILE))
+    pictures.append(detection_map(root, manifest, root / MAP_FILE))
     write_manifest(manifest, root)
     return BuildResult(root, manifest, skipped, len(failures), pictures, seconds)
 
 
-def open_dataset(config: BuildConfig, plan: PosePlan, root: Path) -> None:
-    """Make root this configuration's dataset folder, or refuse it.
-
-    Raises DatasetError if root holds anything else, with what differs.
-    """
-    mark = root / CONFIG_FILE
-    try:
-        if mark.is_file():
-            changed = differences(config, load_config(mark, {}))
-            if changed:
-                raise DatasetError(
-                    f"{root} already holds a dataset of another configuration ({'; '.join(changed)}); "
-                    "choose another --out, or delete that folder"
-                )
-        elif root.exists() and (not root.is_dir() or any(root.iterdir())):
-            raise DatasetError(f"{root} is not empty and not a Headturn dataset; choose another --out")
-        (root / "data").mkdir(parents=True, exist_ok=True)
-        save_config(config, mark)
-        write_poses_csv(plan, root / POSES_FILE)
-        # From here on the dataset is unfinished until a new manifest says otherwise.
-        (root / MANIFEST_FILE).unlink(missing_ok=True)
-    except OSError as error:
-        raise DatasetError(f"{root}: cannot write there ({error.strerror}); choose another --out") from error
-
-
-def find_source(heads: Heads, root: Path, reporter: Reporter) -> HeadSource:
-    """The heads the configuration names; parametric ones are made in root/heads first.
-
-    Raises UsageError if there is none, or a chosen subject does not exist.
-    """
-    if heads.source == PARAMETRIC:
-        folder = root / MADE_HEADS
-        if not folder.exists():
-            reporter.stage("making heads", heads.count)
-            make_heads(
-                folder,
-                count=heads.count,
-                seed=heads.seed,
-                expressions=heads.sampled_expressions,
-                progress=lambda _: reporter.advance(),
-            )
-        path = folder
-    else:
-        path = Path(heads.source)
-    source = find_heads(
-        path,
-        expressions=heads.expressions,
-        license=heads.license,
-        redistributable=heads.redistributable,
-        units=heads.units,
-        up=heads.up,
-        forward=heads.forward,
-    )
-    if heads.subjects is not None:
-        known = {head.subject for head in source.heads} | {head.subject for head in source.skipped}
-        if unknown := [name for name in heads.subjects if name not in known]:
-            raise UsageError(f"{path}: no subject {unknown[0]!r}; `headturn heads list {path}` shows them")
-        source = HeadSource(
-            source.path,
-            source.kind,
-            tuple(h for h in source.heads if h.subject in heads.subjects),
-            tuple(s for s in source.skipped if s.subject in heads.subjects),
-        )
-    return source
-
-
 def prepare_heads(
-    source: HeadSource, config: BuildConfig, executor: Executor, reporter: Reporter
+    source: HeadSource, config: BuildConfig, root: Path, executor: Executor, reporter: Reporter
 ) -> tuple[list[PlannedHead], list[SkippedHead], dict[str, str]]:
     """Check every head and find every subject's face. Bad heads are skipped with their reason.
 
@@ -207,11 +197,13 @@ def prepare_heads(
     for heads in subjects.values():
         # Pose zero is the neutral face's; an open mouth would move the centre.
         heads.sort(key=lambda head: (head.expression != NEUTRAL, head.expression))
-        orders.append({"op": "prepare", "heads": [head_to_json(head) for head in heads]})
+        jobs = [head_to_json(head) for head in heads]
+        orders.append({"op": "prepare", "heads": jobs, "frame": config.poses.frame})
     reporter.stage("preparing heads", len(orders))
     planned: list[PlannedHead] = []
-    versions: dict[str, str] = {}
-    for outcome in executor.run(orders, lambda: None):
+    versions = lane_versions(executor)
+    hashes = {str(file.absolute()): file_hash(file) for head in source.heads for file in head.files}
+    for outcome in PreparedHeads(root, versions, hashes).outcomes(orders, executor):
         reporter.advance()
         heads = subjects[outcome.order["heads"][0]["subject"]]
         receipt = outcome.receipt
@@ -221,17 +213,19 @@ def prepare_heads(
                 skipped.append(SkippedHead(head.subject, head.expression, head.mesh_path, fact["error"]))
                 reporter.note(f"skipped {head.name}: {fact['error']}")
                 continue
-            versions = receipt["versions"]
             prepared = Prepared.from_dict(receipt["prepared"])
             planned.append(
                 PlannedHead(
                     head=head,
                     prepared=prepared,
-                    file_sha256=tuple((_relative(f, source.path), file_sha256(f)) for f in head.files),
+                    file_sha256=tuple(
+                        (relative(file, source.path), hashes[str(file.absolute())]) for file in head.files
+                    ),
                     vertices=fact["vertices"],
                     triangles=fact["triangles"],
                     split=assign_split(head.subject, config.dataset.validation),
                     distance_mm=camera_distance(config, prepared),
+                    anchors=Anchors.from_dict(fact["anchors"]),
                     problems=tuple(fact["problems"]),
                 )
             )
@@ -245,53 +239,44 @@ def prepare_heads(
     return planned, skipped, versions
 
 
-def split_done(orders: list[dict[str, Any]], root: Path) -> tuple[list[PartInfo], list[dict[str, Any]]]:
-    """Parts that are already there and whole, and the orders still to be carried out.
-
-    A part under a unit's name that cannot be read is removed and built again.
-    """
-    done, todo = [], []
-    for order in orders:
-        path = root / "data" / order["split"] / f"part-{order['unit']}.parquet"
-        if path.is_file():
-            try:
-                part = check_part(path)
-            except DatasetError:
-                part = None
-            if part is not None and part.rows == len(order["poses"]):
-                done.append(part)
-                continue
-            path.unlink()
-        todo.append(order)
-    return done, todo
+def file_hash(file: Path) -> str:
+    """SHA-256 of a file; "" if it cannot be read, which preparing its head will say."""
+    try:
+        return file_sha256(file)
+    except OSError:
+        return ""
 
 
 def run_units(
-    orders: list[dict[str, Any]], executor: Executor, reporter: Reporter
+    orders: list[dict[str, Any]], executor: Executor, receipts: Receipts, reporter: Reporter
 ) -> tuple[list[PartInfo], list[dict[str, Any]], dict[str, float]]:
     """Carry out build orders. Returns (parts, failures, lane seconds a stage)."""
     parts: list[PartInfo] = []
     failures: list[dict[str, Any]] = []
     seconds: dict[str, float] = defaultdict(float)
     for outcome in executor.run(orders, reporter.advance):
+        head = outcome.order["head"]
+        facts = {
+            "unit": outcome.order["unit"],
+            "subject": head["subject"],
+            "expression": head["expression"],
+            "poses": len(outcome.order["poses"]),
+            "attempts": outcome.attempts,
+        }
         if outcome.receipt is None:
-            head = outcome.order["head"]
-            failure = {
-                "unit": outcome.order["unit"],
-                "subject": head["subject"],
-                "expression": head["expression"],
-                "poses": len(outcome.order["poses"]),
-                "attempts": outcome.attempts,
-                "reason": outcome.error,
-            }
-            failures.append(failure)
+            failures.append({**facts, "reason": outcome.error, "log": outcome.log.splitlines()})
+            reporter.event("quarantined", {**facts, "reason": outcome.error})
             reporter.note(
-                f"unit {failure['unit']} of {head['subject']}/{head['expression']}: {outcome.error}"
+                f"gave up unit {facts['unit']} of {head['subject']}/{head['expression']}: {outcome.error}"
             )
             continue
-        parts.append(PartInfo(**outcome.receipt["part"]))
-        for stage, spent in outcome.receipt["seconds"].items():
-            seconds[stage] += spent
+        part = PartInfo(**outcome.receipt["part"])
+        receipts.add(part)
+        parts.append(part)
+        spent = {stage: round(value, 3) for stage, value in outcome.receipt["seconds"].items()}
+        reporter.event("unit", {**facts, "detected": part.detected, "seconds": spent})
+        for stage, value in spent.items():
+            seconds[stage] += value
     return parts, failures, dict(seconds)
 
 
@@ -310,33 +295,3 @@ def write_lines(path: Path, records: list[dict[str, Any]]) -> None:
         write_bytes(path, "".join(json.dumps(record) + "\n" for record in records).encode())
     else:
         path.unlink(missing_ok=True)
-
-
-def _head_row(planned: PlannedHead, source: HeadSource, config: BuildConfig) -> HeadRow:
-    head, prepared = planned.head, planned.prepared
-    return HeadRow(
-        subject=head.subject,
-        expression=head.expression,
-        source=head.source,
-        mesh_path=_relative(head.mesh_path, source.path),
-        file_sha256=planned.file_sha256,
-        license=head.license,
-        redistributable=head.redistributable,
-        attribution=head.attribution,
-        units=prepared.units,
-        mm_per_unit=prepared.mm_per_unit,
-        up=prepared.up,
-        forward=prepared.forward,
-        pivot=prepared.pivot,
-        radius_mm=prepared.radius_mm,
-        distance_mm=planned.distance_mm,
-        lens_mm=config.render.lens_mm,
-        vertices=planned.vertices,
-        triangles=planned.triangles,
-        split=planned.split,
-        problems=(*head.problems, *planned.problems, *prepared.notes),
-    )
-
-
-def _relative(path: Path, root: Path) -> str:
-    return Path(os.path.relpath(path, root if root.is_dir() else root.parent)).as_posix()

@@ -2,7 +2,7 @@
 """A lane: one render worker and one detector that turn orders into committed parts.
 
 The same class serves every executor: in-process (serial), as a child process
-(``python -m generator.execution.lane``, local), later as a Ray actor. Orders and
+(``python -m generator.execution.lane``, local), or in a Ray actor. Orders and
 receipts are plain JSON values; images never leave the lane.
 """
 
@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +26,40 @@ import numpy as np
 
 from generator import __version__
 from generator.dataset.part import UnitRows, commit_unit
+from generator.dataset.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.schema import part_schema
 from generator.errors import HeadError, HeadturnError, WorkerError
+from generator.execution.anchoring import anchor_head, level_head
 from generator.execution.prepare import Prepared, prepare
-from generator.execution.renderer import Renderer
+from generator.execution.renderer import DEADLINE_S, Renderer
 from generator.geometry.camera import Camera
+from generator.geometry.rotation import rotation_from_angles
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
+from generator.landmarks.anchors import Anchors, unpack
 from generator.landmarks.detector import POINTS
+from generator.landmarks.levelling import Levelling
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
+from generator.landmarks.surface import Surface
 from generator.plan.render_settings import RenderSettings
+from generator.process import end_with_parent, resident_mib
 
 OnFrame = Callable[[], None]
 
 ENCODING = {
-    # Level 1: 2 % larger than level 3 and a quarter quicker.
-    "png": (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),
+    # Run lengths alone: smaller than level 3 of the usual search on these images, and quicker.
+    "png": (
+        ".png",
+        [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE],
+    ),
     "jpg": (".jpg", [cv2.IMWRITE_JPEG_QUALITY, 95]),
 }
+
+
+PASSES_AHEAD = 8
+"""Uncompressed OpenEXR files that may wait in the scratch folder."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +68,17 @@ class LaneOptions:
 
     scratch: an existing folder of its own, best on a tmpfs. threads: of Cycles,
     0 for every core. cpus: cores the lane and its render worker keep to.
+    deadline_s: a render worker that is silent for so long hangs.
+    memory_mib: of the lane and its render worker together; 0 for no limit.
     """
 
-    scratch: str
+    scratch: str = ""
     blender: str | None = None
     threads: int = 0
     cpus: tuple[int, ...] = ()
     min_confidence: float = 0.5
+    deadline_s: float = DEADLINE_S
+    memory_mib: float = 0.0
 
 
 class Lane:
@@ -69,9 +88,23 @@ class Lane:
         self._scratch = Path(options.scratch)
         frames = self._scratch / "frames"
         frames.mkdir(parents=True, exist_ok=True)
+        self._memory_mib = options.memory_mib
         self._renderer = Renderer(
-            frames, self._scratch / "render.log", blender=options.blender, threads=options.threads
+            frames,
+            self._scratch / "render.log",
+            blender=options.blender,
+            threads=options.threads,
+            deadline_s=options.deadline_s,
         )
+        self._places = self._renderer
+        if options.blender is not None and find_spec("bpy") is not None:
+            # Where a head stands is read off renders, and every Blender renders a little differently.
+            # With the same one for this, labels do not depend on the one that renders the images.
+            looks = self._scratch / "looks"
+            looks.mkdir(exist_ok=True)
+            self._places = Renderer(
+                looks, self._scratch / "render.log", threads=options.threads, deadline_s=options.deadline_s
+            )
         self._detector = MediaPipeFaceMesh(options.min_confidence)
         self._loaded: dict[str, Any] = {}
         self.versions = {
@@ -88,19 +121,38 @@ class Lane:
         Raises HeadError (this head cannot be built), WorkerError (this lane is
         broken, another may do better) or DatasetError (nothing can be written).
         """
+        if order["op"] == "versions":
+            return {"versions": self.versions}
         if order["op"] == "prepare":
-            return self._prepare([head_from_json(head) for head in order["heads"]])
-        return self._build(order, on_frame)
+            return self._prepare([head_from_json(head) for head in order["heads"]], order["frame"])
+
+        def watched() -> None:
+            on_frame()
+            self._check_memory()
+
+        return self._build(order, watched)
 
     def close(self) -> None:
         """End the render worker and free the detector."""
+        self._places.close()
         self._renderer.close()
         self._detector.close()
 
     def kill(self) -> None:
         """End the render worker now."""
+        self._places.kill()
         self._renderer.kill()
         self._detector.close()
+
+    def _check_memory(self) -> None:
+        """WorkerError if lane and render worker outgrew their limit: fresh ones start small again."""
+        if self._memory_mib:
+            used = sum(map(resident_mib, {os.getpid(), self._renderer.pid, self._places.pid}))
+            if used > self._memory_mib:
+                raise WorkerError(
+                    f"a lane grew to {used:.0f} MiB, above its limit of {self._memory_mib:.0f} MiB; "
+                    "give more with --memory"
+                )
 
     def _read(self, head: Head) -> HeadMesh:
         folder = self._scratch / "head"
@@ -108,8 +160,9 @@ class Lane:
         folder.mkdir()
         return read_mesh(head, folder, import_with_blender=self._renderer.import_mesh)
 
-    def _prepare(self, heads: list[Head]) -> dict[str, Any]:
-        """Check every expression of a subject; find the face on the first that shows it."""
+    def _prepare(self, heads: list[Head], frame: str) -> dict[str, Any]:
+        """Check every expression of a subject and anchor its landmarks; find the face and pose
+        zero on the first that shows it."""
         self._loaded = {}
         prepared: Prepared | None = None
         facts: list[dict[str, Any]] = []
@@ -118,7 +171,11 @@ class Lane:
             try:
                 mesh = self._read(head)
                 if prepared is None:
-                    prepared = prepare(head, mesh, self._renderer, self._detector, self._scratch)
+                    prepared = prepare(head, mesh, self._places, self._detector, self._scratch)
+                    anchors, levelling = self._anchor(mesh, prepared)
+                    prepared = level_head(head, prepared, levelling, frame)
+                else:
+                    anchors, _ = self._anchor(mesh, prepared)
             except HeadError as error:
                 reason = reason or str(error)
                 facts.append({"error": str(error)})
@@ -127,20 +184,28 @@ class Lane:
                     {
                         "vertices": len(mesh.vertices),
                         "triangles": len(mesh.triangles),
-                        "problems": list(mesh.problems),
+                        "problems": [*mesh.problems, *anchors.problems],
+                        "anchors": anchors.as_dict(),
                     }
                 )
         if prepared is None:
             raise HeadError(reason)
         return {"prepared": prepared.as_dict(), "facts": facts, "versions": self.versions}
 
+    def _anchor(self, mesh: HeadMesh, prepared: Prepared) -> tuple[Anchors, Levelling | None]:
+        return anchor_head(mesh, prepared, self._places, self._detector, self._scratch)
+
     def _build(self, order: dict[str, Any], on_frame: OnFrame) -> dict[str, Any]:
         seconds: dict[str, float] = {}
         head = head_from_json(order["head"])
         settings = RenderSettings.from_dict(order["settings"])
+        camera = Camera(settings.resolution, settings.lens_mm, order["distance_mm"], settings.projection)
         with _timed(seconds, "load"):
             package = self._package(head, Prepared.from_dict(order["prepared"]))
         poses = np.array(order["poses"], dtype=np.float64).reshape(-1, 3)
+        anchors = unpack(order["anchors"], "<f8").reshape(POINTS, 3)
+        with _timed(seconds, "visibility"):
+            visible = self._surface.visible(anchors, rotation_from_angles(poses), camera)
         landmarks = np.full((len(poses), POINTS, 3), np.nan, dtype=np.float32)
         detected = np.zeros(len(poses), dtype=bool)
         suffix, flags = ENCODING[order["image_format"]]
@@ -162,6 +227,10 @@ class Lane:
             on_frame()
         for _ in frames:  # the worker's closing receipt
             pass
+        passes = None
+        if order["passes"]:
+            with _timed(seconds, "passes"):
+                passes = list(self._passes(package, settings, camera, poses, order["passes"]))
         rows = UnitRows(
             subject=head.subject,
             expression=head.expression,
@@ -170,30 +239,48 @@ class Lane:
             redistributable=head.redistributable,
             angles_deg=poses,
             indices=np.array(order["indices"], dtype=np.int16).reshape(-1, 3),
-            camera=Camera(settings.resolution, settings.lens_mm, order["distance_mm"]),
+            camera=camera,
             detected=detected,
             landmarks=landmarks,
+            anchors=anchors,
+            visible=visible,
             images=images,
             image_suffix=suffix,
+            passes=passes,
         )
         with _timed(seconds, "write"):
             schema = part_schema(order["images"], self.versions, order["configuration_digest"])
             part = commit_unit(rows, schema, Path(order["root"]), order["unit"])
         return {"part": asdict(part), "seconds": seconds, "versions": self.versions}
 
+    def _passes(
+        self, package: Path, settings: RenderSettings, camera: Camera, poses: np.ndarray, names: list[str]
+    ) -> Iterator[tuple[bytes, str]]:
+        """Each pose's passes as (OpenEXR file, SHA-256 of its floats), rendered a few at a time."""
+        for start in range(0, len(poses), PASSES_AHEAD):
+            chunk = poses[start : start + PASSES_AHEAD].tolist()
+            for path in self._renderer.render(package, settings, camera.distance_mm, chunk, passes=names):
+                channels = passes_from_blender(path, names, camera.distance_mm)
+                write_passes(channels, path)
+                yield path.read_bytes(), passes_sha256(channels)
+                path.unlink()
+
     def _package(self, head: Head, prepared: Prepared) -> Path:
         key = {"head": head_to_json(head), "prepared": prepared.as_dict()}
         package = self._scratch / "head.npz"
         if key != self._loaded:
             self._loaded = {}
-            save_package(prepared.normalise(self._read(head)), package)
+            mesh = prepared.normalise(self._read(head))
+            save_package(mesh, package)
+            self._surface = Surface(mesh)
             self._loaded = key
         return package
 
 
 def head_to_json(head: Head) -> dict[str, Any]:
     """Plain values of a head."""
-    return {**asdict(head), "mesh_path": str(head.mesh_path), "files": [str(f) for f in head.files]}
+    files = [str(file.absolute()) for file in head.files]  # a lane may have another working directory
+    return {**asdict(head), "mesh_path": str(head.mesh_path.absolute()), "files": files}
 
 
 def head_from_json(values: dict[str, Any]) -> Head:
@@ -217,12 +304,14 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 def main() -> None:
     """Serve orders from stdin; the first line holds the options."""
+    end_with_parent()
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # whatever a library prints goes to the log
 
     def answer(receipt: dict[str, Any]) -> None:
         receipts.write(json.dumps(receipt) + "\n")
 
+    answer({"ready": os.getpid()})
     options = json.loads(sys.stdin.readline())
     if options["cpus"] and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, options["cpus"])  # inherited by the render worker
@@ -235,7 +324,8 @@ def main() -> None:
                     lane = Lane(LaneOptions(**{**options, "cpus": tuple(options["cpus"])}))
                 answer({"receipt": lane.run(json.loads(line), lambda: answer({"frame": 1}))})
             except HeadturnError as error:
-                answer({"error": str(error), "type": type(error).__name__})
+                log = getattr(error, "log", "")
+                answer({"error": str(error), "type": type(error).__name__, "log": log})
     finally:
         if lane is not None:
             lane.close()

@@ -6,7 +6,9 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import queue
 import subprocess
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,13 +16,17 @@ from typing import Any
 from generator.errors import WorkerError
 
 LOG_TAIL_LINES = 3
+"""Lines of the child's log that go into the one line of an error."""
+
+LOG_END_LINES = 20
+"""Lines that are kept with a unit that is given up."""
 
 
 class LineProcess:
     """Starts command, keeps what it prints to stderr in log, ends it when closed.
 
     A child whose stdin closes must end by itself: that is what keeps a crashed
-    parent from leaving orphans.
+    parent from leaving orphans. See also :func:`generator.process.end_with_parent`.
     """
 
     def __init__(self, command: Sequence[str], log: Path, env: dict[str, str] | None = None) -> None:
@@ -41,6 +47,10 @@ class LineProcess:
                 )
         except OSError as error:
             raise WorkerError(f"cannot start {command[0]}: {error.strerror}") from error
+        # A pipe cannot be waited on with a deadline everywhere; a queue can.
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     @property
     def pid(self) -> int:
@@ -56,43 +66,72 @@ class LineProcess:
         except (BrokenPipeError, ValueError) as error:
             raise self._ended() from error
 
-    def receive(self) -> dict[str, Any]:
-        """Wait for one receipt. WorkerError with the end of the log if the child is gone."""
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+    def receive(self, deadline_s: float | None = None) -> dict[str, Any]:
+        """Wait for one receipt.
+
+        Raises WorkerError with the end of the log if the child is gone, or if it
+        says nothing for deadline_s; then it is ended.
+        """
+        try:
+            line = self._lines.get(timeout=deadline_s)
+        except queue.Empty:
+            self.kill()
+            raise self._error(
+                f"{self._name} hung: no sign of life for {deadline_s:.0f} s, so it was ended"
+            ) from None
         if not line.endswith("\n"):
             raise self._ended()
         try:
             return json.loads(line)
         except json.JSONDecodeError as error:
-            raise WorkerError(
+            raise self._error(
                 f"{self._name} answered with something that is not JSON: {line[:80]!r}"
             ) from error
 
     def close(self, timeout: float = 5.0) -> None:
         """Close the child's stdin, wait for its end, kill it if it does not come."""
-        self._close_pipes()
+        self._close_stdin()
         try:
             self._process.wait(timeout)
         except subprocess.TimeoutExpired:
-            self.kill()
+            self._process.kill()
+            self._process.wait()
+        self._reader.join(timeout)
 
     def kill(self) -> None:
         """End the child at once."""
         self._process.kill()
         self._process.wait()
-        self._close_pipes()
+        self._close_stdin()
+        self._reader.join(1.0)
 
-    def _close_pipes(self) -> None:
-        for stream in (self._process.stdin, self._process.stdout):
-            # The child may have gone first, with an order of ours still in the pipe.
-            with contextlib.suppress(BrokenPipeError):
-                if stream is not None:
-                    stream.close()
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as stream:
+            for line in stream:
+                self._lines.put(line)
+        self._lines.put("")
+
+    def _close_stdin(self) -> None:
+        # The child may have gone first, with an order of ours still in the pipe.
+        with contextlib.suppress(BrokenPipeError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
 
     def _ended(self) -> WorkerError:
+        self._lines.put("")  # whoever asks again gets the same answer
         code = self._process.wait()
-        text = self.log.read_text(encoding="utf-8", errors="replace") if self.log.exists() else ""
-        tail = " | ".join(line.strip() for line in text.splitlines()[-LOG_TAIL_LINES:] if line.strip())
         how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-        return WorkerError(f"{self._name} {how}: {tail or 'it printed nothing'}")
+        said = " | ".join(self._log_end()[-LOG_TAIL_LINES:])
+        return self._error(f"{self._name} {how}: {said or 'it printed nothing'}")
+
+    def _error(self, message: str) -> WorkerError:
+        return WorkerError(message, "\n".join(self._log_end()))
+
+    def _log_end(self) -> list[str]:
+        if not self.log.exists():
+            return []
+        with self.log.open("rb") as file:
+            file.seek(max(0, self.log.stat().st_size - 2**14))
+            text = file.read().decode("utf-8", errors="replace")
+        return [line.strip() for line in text.splitlines() if line.strip()][-LOG_END_LINES:]

@@ -31,10 +31,12 @@ from generator.plan.render_settings import RenderSettings
 
 log = logging.getLogger(__name__)
 
-PIVOT_DEPTH = 0.90
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+PIVOT_DEPTH = 1.00
 """Depth of the ear axis behind the outer eye corners, in outer-eye distances.
 
-About 80 mm for eyes 90 mm apart; see docs/heads.md for how it was measured.
+About 90 mm for eyes 90 mm apart; see docs/heads.md for how it was measured.
 """
 
 REACH = 2.0
@@ -60,6 +62,8 @@ class Prepared:
     units, mm_per_unit, up, forward: of the source. pivot: in source units and
     axes. radius_mm: of the sphere about the pivot that holds the head.
     eye_distance_mm: between the outer eye corners. notes: what was guessed.
+    frame: "source" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
+    :meth:`normalise` only where frame is "canonical".
     """
 
     units: str
@@ -70,11 +74,20 @@ class Prepared:
     radius_mm: float
     eye_distance_mm: float
     notes: tuple[str, ...] = ()
+    frame: str = "source"
+    correction: tuple[float, ...] = IDENTITY
+    correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
+
+    @property
+    def levelling(self) -> np.ndarray:
+        """R_U [3, 3] that is applied before any pose: the correction, or nothing."""
+        return np.array(self.correction if self.frame == "canonical" else IDENTITY).reshape(3, 3)
 
     def normalise(self, mesh: HeadMesh) -> HeadMesh:
-        """The mesh in frame U, mm, pivot at the origin."""
+        """The mesh in frame U at the chosen pose zero, mm, pivot at the origin."""
         centred = (mesh.vertices - np.array(self.pivot)) * self.mm_per_unit
-        return replace(mesh, vertices=centred @ axes_rotation(self.up, self.forward).T)
+        rotation = self.levelling @ axes_rotation(self.up, self.forward)
+        return replace(mesh, vertices=centred @ rotation.T)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -83,7 +96,8 @@ class Prepared:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Prepared:
         """The inverse of :meth:`as_dict`."""
-        return cls(**{**values, "pivot": tuple(values["pivot"]), "notes": tuple(values["notes"])})
+        lists = ("pivot", "notes", "correction", "correction_sd_deg")
+        return cls(**{**values, **{name: tuple(values[name]) for name in lists}})
 
 
 def prepare(head: Head, mesh: HeadMesh, renderer: Renderer, detector: Detector, scratch: Path) -> Prepared:
@@ -197,9 +211,9 @@ def _look(
         return None
     camera = Camera(_LOOK.resolution, _LOOK.lens_mm, distance)
     pixels = landmarks[[RIGHT_EYE_OUTER, LEFT_EYE_OUTER, CHIN], :2]
-    rays = camera.rays(pixels)
+    origins, rays = camera.rays(pixels)
     vertices = seen.vertices @ CAMERA_FROM_GRAPHICS + camera.translation_mm
-    hits = first_hits(np.zeros_like(rays), rays, vertices, mesh.triangles)
+    hits = first_hits(origins, rays, vertices, mesh.triangles)
     if np.isnan(hits).any():
         return None
     points = (hits - camera.translation_mm) @ CAMERA_FROM_GRAPHICS / mm + centre

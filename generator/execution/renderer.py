@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,6 +18,11 @@ from generator.execution.scratch import scratch_folder
 from generator.plan.render_settings import RenderSettings
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+
+OLDEST_BLENDER = (4, 2)
+
+DEADLINE_S = 300.0
+"""Longest wait for one sign of life. Loading a large scan and its first frame take seconds."""
 
 
 def worker_command(blender: str | None, threads: int) -> list[str]:
@@ -39,6 +46,22 @@ def worker_command(blender: str | None, threads: int) -> list[str]:
     return [sys.executable, "-m", "generator.blender.worker", str(threads)]
 
 
+def check_blender(blender: str) -> None:
+    """Ask a Blender executable for its version. UsageError if it is none, or older than 4.2."""
+    try:
+        said = subprocess.run(
+            [blender, "--version"], capture_output=True, text=True, timeout=DEADLINE_S, check=False
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise UsageError(f"{blender}: cannot be started ({error}); give the path of a Blender") from error
+    found = re.search(r"^Blender (\d+)\.(\d+)", said, re.MULTILINE)
+    if found is None:
+        raise UsageError(f"{blender}: does not answer --version as a Blender does; give the path of one")
+    if (int(found[1]), int(found[2])) < OLDEST_BLENDER:
+        oldest = ".".join(map(str, OLDEST_BLENDER))
+        raise UsageError(f"{blender}: {found[0]} is too old, Headturn needs {oldest} or newer")
+
+
 class Renderer:
     """One render worker and the folder its frames appear in.
 
@@ -47,15 +70,27 @@ class Renderer:
     frames: an existing folder, best on a tmpfs.
     blender: a Blender executable; None uses the bpy wheel.
     threads: Cycles threads; 0 means every core.
+    deadline_s: a worker that is silent for so long hangs, and is ended.
     """
 
-    def __init__(self, frames: Path, log: Path, *, blender: str | None = None, threads: int = 0) -> None:
+    def __init__(
+        self,
+        frames: Path,
+        log: Path,
+        *,
+        blender: str | None = None,
+        threads: int = 0,
+        deadline_s: float = DEADLINE_S,
+    ) -> None:
         self.frames = frames
+        self._deadline_s = deadline_s
         path = os.pathsep.join([str(_PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
         # A Blender executable must not see our environment: its Python is another one.
         env = {"PYTHONPATH": path} if blender is None else {"PYTHONPATH": ""}
+        # Nor another colour management, which studios set for all programs and Blender 5 for its children.
+        env["OCIO"] = ""
         self._process = LineProcess(worker_command(blender, threads), log, env)
-        ready = self._process.receive()
+        ready = self._process.receive(deadline_s)
         if "ready" not in ready:
             raise WorkerError(f"the render worker did not start: {ready}")
         self.version: str = ready["ready"]
@@ -73,8 +108,11 @@ class Renderer:
         poses: Sequence[Sequence[float]],
         *,
         frame_format: str = "bmp",
+        passes: Sequence[str] = (),
     ) -> Iterator[Path]:
         """Render poses [(yaw, pitch, roll) degrees, ...] of a prepared head.
+
+        passes: render these instead of the picture, see generator.blender.passes.
 
         Yields each frame's path as soon as it is written; the caller removes it.
         Raises HeadError if Blender cannot load the head, WorkerError if the
@@ -88,7 +126,8 @@ class Renderer:
                 "distance_mm": distance_mm,
                 "poses": [list(map(float, pose)) for pose in poses],
                 "out": str(self.frames),
-                "format": frame_format,
+                "format": "exr" if passes else frame_format,
+                "passes": list(passes),
             }
         )
         for receipt in self._receipts():
@@ -113,7 +152,7 @@ class Renderer:
 
     def _receipts(self) -> Iterator[dict]:
         while True:
-            receipt = self._process.receive()
+            receipt = self._process.receive(self._deadline_s)
             if "error" in receipt:
                 raise HeadError(f"Blender: {receipt['error']}")
             yield receipt

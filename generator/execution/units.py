@@ -5,17 +5,20 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from generator.dataset.schema import SCHEMA_VERSION
+from generator.execution.chunks import Chunk
 from generator.execution.lane import head_to_json
 from generator.execution.prepare import Prepared
 from generator.geometry.camera import framing_distance
+from generator.geometry.rotation import graphics_rotation
 from generator.heads.head import Head
+from generator.landmarks.anchors import Anchors, pack
 from generator.plan.config import BuildConfig
-from generator.plan.poses import PosePlan
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class PlannedHead:
     triangles: int
     split: str
     distance_mm: float
+    anchors: Anchors
     problems: tuple[str, ...] = ()
 
 
@@ -43,12 +47,14 @@ def camera_distance(config: BuildConfig, prepared: Prepared) -> float:
     settings = config.render.settings()
     if settings.distance_mm is not None:
         return settings.distance_mm
-    return round(framing_distance(prepared.radius_mm, settings.lens_mm, settings.margin), 2)
+    return round(
+        framing_distance(prepared.radius_mm, settings.lens_mm, settings.margin, settings.projection), 2
+    )
 
 
 def plan_units(
     heads: list[PlannedHead],
-    plan: PosePlan,
+    chunks: Sequence[Chunk],
     config: BuildConfig,
     *,
     root: Path,
@@ -59,23 +65,25 @@ def plan_units(
 
     A unit's name is the hash of head files, placement, look, poses, detector and
     versions, so a part that is already there under that name needs no rebuilding.
+    "earlier_unit" is the name it had when its poses had another place in the grid.
     """
     settings = config.render.settings().as_dict()
+    names = [_digest([chunk.poses, chunk.indices]) for chunk in chunks]
+    earlier_names = [_digest([c.poses, c.earlier_indices]) if c.earlier_indices else None for c in chunks]
     orders = []
     for planned in heads:
-        for start in range(0, len(plan.angles_deg), config.dataset.unit_size):
-            chunk = slice(start, start + config.dataset.unit_size)
-            content = {
-                "settings": settings,
-                "prepared": planned.prepared.as_dict(),
-                "distance_mm": planned.distance_mm,
-                "poses": plan.angles_deg[chunk].tolist(),
-                "indices": plan.indices[chunk].tolist(),
-                "split": planned.split,
-                "images": config.dataset.images,
-                "image_format": config.dataset.image_format,
-            }
-            identity = {
+        content = {
+            "settings": settings,
+            "prepared": planned.prepared.as_dict(),
+            "anchors": pack(planned.anchors.turned(graphics_rotation(planned.prepared.levelling)), "<f8"),
+            "distance_mm": planned.distance_mm,
+            "split": planned.split,
+            "images": config.dataset.images,
+            "image_format": config.dataset.image_format,
+            "passes": config.dataset.passes,
+        }
+        look = _digest(
+            {
                 **content,
                 "subject": planned.head.subject,
                 "expression": planned.head.expression,
@@ -85,15 +93,24 @@ def plan_units(
                 "versions": versions,
                 "schema": SCHEMA_VERSION,
             }
-            name = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
+        )
+        head = head_to_json(planned.head)
+        for chunk, name, earlier in zip(chunks, names, earlier_names, strict=True):
             orders.append(
                 {
                     "op": "build",
-                    "unit": name,
-                    "head": head_to_json(planned.head),
+                    "unit": _digest([look, name])[:16],
+                    "earlier_unit": _digest([look, earlier])[:16] if earlier else None,
+                    "head": head,
                     "root": str(root),
                     "configuration_digest": configuration_digest,
+                    "poses": chunk.poses,
+                    "indices": chunk.indices,
                     **content,
                 }
             )
     return orders
+
+
+def _digest(values: Any) -> str:
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pinhole camera: lens and sensor to K, and the distance that frames a head."""
+"""The camera: lens and sensor to K, and the distance that frames a head."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,22 +13,34 @@ SENSOR_MM = 36.0
 """Sensor width of a full-frame camera, Blender's default."""
 
 
+Projection = Literal["perspective", "orthographic"]
+
+
 @dataclass(frozen=True)
 class Camera:
-    """A square pinhole camera that looks along +z of frame C at the head's pivot.
+    """A square camera that looks along +z of frame C at the head's pivot.
 
     resolution: image side in pixels. lens_mm: focal length for a 36 mm sensor.
     distance_mm: from the optical centre to the pivot of the rotation.
+    projection: "perspective" divides by a point's own depth, "orthographic" by
+        the pivot's: all rays are parallel, and the scale is the one that the
+        perspective camera has at the pivot.
     """
 
     resolution: int
     lens_mm: float
     distance_mm: float
+    projection: Projection = "perspective"
 
     @property
     def focal_px(self) -> float:
         """Focal length in pixels."""
         return self.resolution * self.lens_mm / SENSOR_MM
+
+    @property
+    def view_mm(self) -> float:
+        """Side of the square seen at the pivot, mm."""
+        return self.distance_mm * SENSOR_MM / self.lens_mm
 
     @property
     def matrix(self) -> np.ndarray:
@@ -42,24 +55,60 @@ class Camera:
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
         """Pixels of points in frame C. float [..., 3] mm -> float64 [..., 2] (x, y)."""
-        image = np.asarray(points_mm, dtype=np.float64) @ self.matrix.T
-        return image[..., :2] / image[..., 2:]
+        points = np.asarray(points_mm, dtype=np.float64)
+        depth = points[..., 2:] if self.projection == "perspective" else self.distance_mm
+        return points[..., :2] / depth * self.focal_px + self.resolution / 2.0
 
-    def rays(self, pixels: np.ndarray) -> np.ndarray:
-        """Directions in frame C (z = 1) through pixels. float [..., 2] -> float64 [..., 3]."""
+    def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origins (at z = 0) and directions (z = 1) in frame C of the rays through pixels.
+
+        float [..., 2] -> float64 [..., 3] twice.
+        """
         centred = (np.asarray(pixels, dtype=np.float64) - self.resolution / 2.0) / self.focal_px
-        return np.concatenate([centred, np.ones_like(centred[..., :1])], axis=-1)
+        ones = np.ones_like(centred[..., :1])
+        if self.projection == "perspective":
+            return np.zeros((*centred.shape[:-1], 3)), np.concatenate([centred, ones], axis=-1)
+        origins = np.concatenate([centred * self.distance_mm, 0 * ones], axis=-1)
+        return origins, np.concatenate([0 * centred, ones], axis=-1)
+
+    def towards(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The rays (origins, directions with z = 1) that meet points in frame C, as :meth:`rays`."""
+        return self.rays(self.project(points_mm))
 
 
-def framing_distance(radius_mm: float, lens_mm: float, margin: float) -> float:
+def framing_distance(
+    radius_mm: float, lens_mm: float, margin: float, projection: Projection = "perspective"
+) -> float:
     """Distance at which a sphere about the pivot just fits into the image, in mm.
 
     A sphere of radius r seen from d fills the half-angle asin(r / d), so a head
-    inside the sphere stays inside the image at every rotation.
+    inside the sphere stays inside the image at every rotation. Without
+    perspective it is as wide as the view.
 
     margin: 1 touches the border; 1.1 leaves a tenth of the radius free.
     """
     if not (radius_mm > 0 and lens_mm > 0 and margin > 0):
         raise ValueError("radius, lens and margin must be positive")
     half_angle = math.atan(SENSOR_MM / 2 / lens_mm)
-    return margin * radius_mm / math.sin(half_angle)
+    reach = math.sin(half_angle) if projection == "perspective" else math.tan(half_angle)
+    return margin * radius_mm / reach
+
+
+def project_with(matrix: np.ndarray, points_mm: np.ndarray, pivot_depth_mm: np.ndarray) -> np.ndarray:
+    """Pixels of points of many rows from their K alone.
+
+    Parameters
+    ----------
+    matrix: float [N, 3, 3]. points_mm: float [N, P, 3], frame C.
+    pivot_depth_mm: float [N], t_z of orthographic rows, NaN where the row is perspective.
+
+    Returns
+    -------
+    float64 [N, P, 2].
+    """
+    points = np.asarray(points_mm, dtype=np.float64)
+    pivot = np.asarray(pivot_depth_mm, dtype=np.float64)[:, None, None]
+    depth = np.where(np.isnan(pivot), points[..., 2:], pivot)
+    ones = np.ones_like(points[..., :1])
+    image = np.concatenate([points[..., :2] / depth, ones], axis=-1) @ np.swapaxes(matrix, -1, -2)
+    return image[..., :2]

@@ -54,3 +54,23 @@ def fit_similarity(source: np.ndarray, target: np.ndarray) -> Similarity:
     translation = mean_b - scale * rotation @ mean_a
     residual = b - (scale * a @ rotation.T + translation)
     return Similarity(scale, rotation, translation, float(np.sqrt((residual**2).sum(1).mean())))
+
+
+def fit_rotations(source: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """The rotations of :func:`fit_similarity` from one point set to many, at once.
+
+    Parameters
+    ----------
+    source: float [N, 3]; targets: float [M, N, 3], row i corresponds to row i.
+
+    Returns
+    -------
+    float64 [M, 3, 3], proper.
+    """
+    a = np.asarray(source, dtype=np.float64)
+    b = np.asarray(targets, dtype=np.float64)
+    cross = np.swapaxes(b - b.mean(axis=1, keepdims=True), 1, 2) @ (a - a.mean(axis=0))
+    u, _, vt = np.linalg.svd(cross)
+    sign = np.ones((len(b), 1, 3))
+    sign[:, 0, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    return (u * sign) @ vt

@@ -45,7 +45,13 @@ class Heads(_Section):
 
 
 class Poses(_Section):
-    """Which poses; see generator.plan.poses. Ranges are [start, stop, step] or [low, high]."""
+    """Which poses; see generator.plan.poses. Ranges are [start, stop, step] or [low, high].
+
+    ``frame``: where pose zero is: the mesh's own axes ("source"), or every head levelled to
+    the same face ("canonical").
+    """
+
+    frame: Literal["source", "canonical"] = "source"
 
     kind: Literal["grid", "uniform", "sobol", "csv"] = "grid"
     yaw: list[float] = [-50, 50, 10]
@@ -78,6 +84,7 @@ class Render(_Section):
     samples: int | None = Field(None, ge=1, le=4096)
     resolution: int = Field(256, ge=16, le=4096)
     lens_mm: float = Field(85.0, ge=10, le=1000)
+    projection: Literal["perspective", "orthographic"] = "perspective"
     distance_mm: float | None = Field(None, ge=100, le=100_000)
     margin: float = Field(1.05, ge=0.5, le=10)
     light_yaw_deg: float = Field(25.0, ge=-180, le=180)
@@ -111,6 +118,7 @@ class Dataset(_Section):
 
     images: Literal["files", "embedded", "none"] = "files"
     image_format: Literal["png", "jpg"] = "png"
+    passes: list[Literal["depth", "normal", "position", "uv", "object_index"]] = []
     validation: float = Field(0.0, ge=0, le=1)
     unit_size: int = Field(100, ge=1, le=100_000)
 
@@ -164,9 +172,9 @@ def load_config(path: Path | None, overrides: dict[str, dict[str, Any]]) -> Buil
         raise UsageError(f"{path or 'configuration'}: {where}: {first['msg']}{given}") from error
 
 
-def save_config(config: BuildConfig, path: Path) -> None:
-    """Write the resolved configuration as TOML; None values are left out, as TOML has none."""
-    path.write_text(tomli_w.dumps(config.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
+def config_toml(config: BuildConfig) -> str:
+    """The resolved configuration as TOML; None values are left out, as TOML has none."""
+    return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
 
 
 def differences(ours: BuildConfig, theirs: BuildConfig) -> list[str]:

@@ -151,10 +151,18 @@ def csv_plan(path: Path) -> PosePlan:
 
 def write_poses_csv(plan: PosePlan, path: Path) -> None:
     """Write a plan so that :func:`csv_plan` gives the same angles and indices, bit by bit."""
-    lines = ["yaw_deg,pitch_deg,roll_deg,yaw_index,pitch_index,roll_index"]
-    for angles, indices in zip(plan.angles_deg.tolist(), plan.indices.tolist(), strict=True):
-        lines.append(",".join([*map(repr, angles), *map(str, indices)]))
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    Path(path).write_text(poses_csv(plan), encoding="utf-8", newline="\n")
+
+
+def poses_csv(plan: PosePlan, chunks: Iterable[int] | None = None) -> str:
+    """The text of :func:`write_poses_csv`, with a last column that says which poses are built together."""
+    names = [f"{angle}_{what}" for what in ("deg", "index") for angle in ANGLES]
+    columns = [*plan.angles_deg.T.tolist(), *plan.indices.T.tolist()]
+    if chunks is not None:
+        names.append("chunk")
+        columns.append([int(number) for number in chunks])
+    rows = (",".join(map(repr, row)) for row in zip(*columns, strict=True))
+    return "\n".join([",".join(names), *rows]) + "\n"
 
 
 def pose_name(yaw: float, pitch: float, roll: float) -> str:

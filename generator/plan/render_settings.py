@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from generator.geometry.camera import Projection
+
 
 @dataclass(frozen=True)
 class RenderSettings:
@@ -13,6 +15,7 @@ class RenderSettings:
 
     resolution: image side in pixels (square). lens_mm: focal length on a 36 mm sensor.
     distance_mm: camera to pivot; None frames each head so that it fits at every pose.
+    projection: "perspective", or "orthographic": parallel rays, the scale of the lens at the pivot.
     margin: free space around the head when distance_mm is None (1 = none).
     preset: "fast" (light computed from the normal, noise-free) or "quality" (path traced).
     samples: Cycles samples a pixel.
@@ -32,6 +35,7 @@ class RenderSettings:
     light_pitch_deg: float = 35.0
     ambient: float = 0.35
     background: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    projection: Projection = "perspective"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -1,138 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small dataset made by the real writer from drawn faces and a synthetic landmark cloud."""
+"""Fixtures over :mod:`small_dataset`."""
 
 from __future__ import annotations
 
-import io
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image, ImageDraw
+from small_dataset import HEADS, SMALL_PLAN, build_dataset, unit_rows
 
-from generator.dataset.card import write_card
-from generator.dataset.heads_table import HeadRow, write_heads
-from generator.dataset.manifest import Manifest, configuration_digest, write_manifest
-from generator.dataset.part import UnitRows, commit_unit
-from generator.dataset.schema import ImageMode, part_schema
-from generator.geometry.camera import Camera
-from generator.geometry.rotation import rotation_from_angles
-from generator.plan.poses import PosePlan, grid_plan, write_poses_csv
-
-VERSIONS = {"headturn": "0.0.0", "numpy": np.__version__}
-CAMERA = Camera(resolution=64, lens_mm=85.0, distance_mm=700.0)
-SMALL_PLAN = grid_plan((-30, 30, 30), (-20, 20, 20), (0, 10, 10))
-
-
-def face_points() -> np.ndarray:
-    """468 points on the front of an ellipsoid the size of a face, mm in frame C."""
-    k = np.arange(468) + 0.5
-    height, turn = 1 - 2 * k / 468, np.pi * (1 + 5**0.5) * k
-    ring = np.sqrt(1 - height**2)
-    return np.stack([70 * ring * np.cos(turn) * 0.9, 90 * height, -75 * np.abs(ring * np.sin(turn))], axis=-1)
-
-
-def draw_face(rotation: np.ndarray, camera: Camera, tone: tuple[int, int, int]) -> bytes:
-    """PNG of eyes, nose and mouth on an oval, at their places in the pose."""
-    points = {"eye": (-30, -20, -65), "eye2": (30, -20, -65), "nose": (0, 10, -90), "mouth": (0, 45, -65)}
-    image = Image.new("RGB", (camera.resolution, camera.resolution), (128, 128, 128))
-    draw = ImageDraw.Draw(image)
-    outline = camera.project(face_points() * 1.1 @ rotation.T + camera.translation_mm)
-    (left, top), (right, bottom) = outline.min(axis=0), outline.max(axis=0)
-    draw.ellipse((left, top, right, bottom), fill=tone)
-    for name, point in points.items():
-        x, y = camera.project(rotation @ np.array(point, float) + camera.translation_mm)
-        r = camera.resolution / 40
-        draw.ellipse((x - r, y - r, x + r, y + r), fill=(40, 20, 20) if "eye" in name else (200, 90, 90))
-    file = io.BytesIO()
-    image.save(file, "PNG")
-    return file.getvalue()
-
-
-def unit_rows(head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAMERA) -> UnitRows:
-    """One unit: the chosen poses of one head. Large yaw with pitch up is a miss."""
-    angles = plan.angles_deg[chosen]
-    rotations = rotation_from_angles(angles)
-    detected = ~((angles[:, 0] >= 30) & (angles[:, 1] >= 20))
-    landmarks = np.full((len(angles), 468, 3), np.nan, np.float32)
-    for row in np.flatnonzero(detected):
-        points = face_points() @ rotations[row].T + camera.translation_mm
-        scale = camera.focal_px / camera.distance_mm
-        depth = (points[:, 2:] - camera.distance_mm) * scale
-        landmarks[row] = np.concatenate([camera.project(points), depth], axis=1)
-    tone = (224, 190, 160) if head.subject < "s2" else (150, 105, 80)
-    return UnitRows(
-        subject=head.subject,
-        expression=head.expression,
-        split=head.split,
-        head_license=head.license,
-        redistributable=head.redistributable,
-        angles_deg=angles,
-        indices=plan.indices[chosen],
-        camera=camera,
-        detected=detected,
-        landmarks=landmarks,
-        images=[draw_face(rotation, camera, tone) for rotation in rotations],
-    )
-
-
-def head_row(subject: str, split: str) -> HeadRow:
-    return HeadRow(
-        subject=subject,
-        expression="neutral",
-        source="mesh",
-        mesh_path=f"{subject}/head.obj",
-        file_sha256=((f"{subject}/head.obj", "0" * 64), (f"{subject}/skin.png", "1" * 64)),
-        license="CC0-1.0",
-        redistributable=True,
-        attribution="A. Person | 2020",
-        units="cm",
-        mm_per_unit=10.0,
-        up="+Y",
-        forward="+Z",
-        pivot=(0.0, 1.5, -2.25),
-        radius_mm=120.0,
-        distance_mm=CAMERA.distance_mm,
-        lens_mm=CAMERA.lens_mm,
-        vertices=100,
-        triangles=196,
-        split=split,
-        problems=("the eyes are closed",) if subject == "s2" else (),
-    )
-
-
-HEADS = (head_row("s1", "train"), head_row("s2", "validation"))
-
-
-def build_dataset(
-    root: Path,
-    images: ImageMode = "files",
-    heads: tuple[HeadRow, ...] = HEADS,
-    plan: PosePlan = SMALL_PLAN,
-    chunk: int = 10,
-    camera: Camera = CAMERA,
-) -> Manifest:
-    """A finished dataset of heads x plan, a part for every chunk of poses."""
-    configuration = {"poses": plan.kind, "images": images}
-    schema = part_schema(images, VERSIONS, configuration_digest(configuration))
-    root.mkdir(parents=True)
-    parts = []
-    for head in heads:
-        for start in range(0, len(plan), chunk):
-            unit = unit_rows(head, plan, slice(start, start + chunk), camera)
-            parts.append(commit_unit(unit, schema, root, f"{head.subject}-{start}"))
-    heads = tuple(replace(h, lens_mm=camera.lens_mm, distance_mm=camera.distance_mm) for h in heads)
-    write_heads(heads, root)
-    write_poses_csv(plan, root / "poses.csv")
-    manifest = Manifest(
-        VERSIONS, configuration, tuple(parts), images, len(heads), created_by="headturn build"
-    )
-    write_card(manifest, root)
-    write_manifest(manifest, root)
-    return manifest
+from generator.dataset.manifest import Manifest
+from generator.dataset.part import UnitRows
 
 
 @pytest.fixture(scope="session")

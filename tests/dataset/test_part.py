@@ -33,6 +33,11 @@ def test_table_holds_what_the_unit_gave(rows):
     np.testing.assert_array_equal(as_array(table, "rotation").reshape(-1, 3, 3), rotation)
     np.testing.assert_array_equal(as_array(table, "quaternion"), quaternion_from_rotation(rotation))
     np.testing.assert_array_equal(as_array(table, "landmarks"), rows.landmarks)
+    exact = as_array(table, "landmarks_exact").astype(float)
+    anchored = exact[3] - rows.camera.translation_mm  # back to pose zero: x R is the inverse of R x
+    np.testing.assert_allclose(anchored @ rotation[3], rows.anchors, atol=1e-4)
+    np.testing.assert_array_equal(np.isnan(exact).any(axis=(0, 2)), np.isnan(rows.anchors).any(axis=1))
+    np.testing.assert_array_equal(as_array(table, "landmarks_visible"), rows.visible)
     np.testing.assert_array_equal(as_array(table, "camera")[3].reshape(3, 3), rows.camera.matrix)
     assert table["sample_id"][0].as_py() == "s1/neutral/y-30_p-20_r+0"
     assert table["image_sha256"].to_pylist() == [hashlib.sha256(i).hexdigest() for i in rows.images]
@@ -42,7 +47,7 @@ def test_table_holds_what_the_unit_gave(rows):
 
 def test_schema_metadata_says_how_to_read_it():
     metadata = {key.decode(): value.decode() for key, value in SCHEMA.metadata.items()}
-    assert metadata["headturn.schema_version"] == "1.0.0"
+    assert metadata["headturn.schema_version"] == "1.1.0"
     assert metadata["headturn.landmark_topology"] == "mediapipe-face-mesh-468"
     assert metadata["headturn.configuration_digest"] == "c" * 64
     assert json.loads(metadata["headturn.versions"]) == {"headturn": "0"}
@@ -58,10 +63,12 @@ def test_schema_metadata_says_how_to_read_it():
         {"detected": np.zeros(18, bool)},
         {"images": [b""]},
         {"landmarks": np.zeros((18, 1404), np.float32)},
+        {"visible": np.ones((18, 468), bool)},
+        {"passes": [(b"", "")]},
     ],
 )
 def test_unit_refuses_what_does_not_fit(rows, change):
-    with pytest.raises(ValueError, match=r"expected shape|landmarks must be"):
+    with pytest.raises(ValueError, match=r"expected|landmarks must be|without an anchor"):
         replace(rows, **change)
 
 
@@ -136,7 +143,10 @@ def test_digest_is_the_documented_one():
     assert content_digest(table) == f"{total:064x}"
 
 
-@pytest.mark.parametrize("column", ["yaw_deg", "landmarks", "subject", "detected", "yaw_index"])
+@pytest.mark.parametrize(
+    "column",
+    ["yaw_deg", "landmarks", "landmarks_exact", "landmarks_visible", "subject", "detected", "yaw_index"],
+)
 def test_digest_sees_every_value(rows, column):
     table = unit_table(rows, SCHEMA)
     place = table.schema.get_field_index(column)

@@ -11,7 +11,18 @@ from PIL import Image, ImageColor
 from generator.dataset.detection import tally_detection
 from generator.dataset.manifest import read_manifest
 from generator.dataset.open import image_bytes, read_rows, read_samples
-from generator.dataset.pictures import DOT, GAP, LEFT, MISS, TILE, TOP, contact_sheet, detection_map
+from generator.dataset.pictures import (
+    ANCHOR_TILE,
+    DOT,
+    GAP,
+    LEFT,
+    MISS,
+    TILE,
+    TOP,
+    anchor_sheet,
+    contact_sheet,
+    detection_map,
+)
 from generator.errors import DatasetError
 from generator.plan.poses import uniform_plan
 
@@ -38,6 +49,17 @@ def test_contact_sheet(build, tmp_path, images):
     assert count(corner, MISS) > 2000 and count(corner, DOT) == 0
     again = contact_sheet(tmp_path / "d", manifest, tmp_path / "again.png")
     assert again.read_bytes() == out.read_bytes()
+
+
+def test_anchor_sheet_shows_what_is_seen_and_what_is_hidden(build, tmp_path):
+    manifest = build(tmp_path / "d")
+    with Image.open(anchor_sheet(tmp_path / "d", manifest, tmp_path / "sheet.png")) as picture:
+        sheet = np.asarray(picture)
+    step = ANCHOR_TILE + GAP
+    front = sheet[TOP : TOP + ANCHOR_TILE, LEFT : LEFT + ANCHOR_TILE]
+    turned = sheet[TOP : TOP + ANCHOR_TILE, LEFT + step : LEFT + step + ANCHOR_TILE]
+    assert count(front, DOT) > 300 and count(turned, DOT) > 200
+    assert count(turned, MISS) > count(front, MISS)
 
 
 def test_landmarks_lie_on_the_face(dataset):

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from generator.dataset.anchors_table import read_anchors, write_anchors
 from generator.dataset.heads_table import read_heads, write_heads
 from generator.dataset.manifest import read_manifest, write_manifest
 from generator.dataset.part import check_part, read_part
@@ -129,6 +130,9 @@ def test_a_tampered_label(dataset):
         ("height", 65, "camera", "square image"),
         ("detected", False, "landmarks", "not detected, but a landmark is not NaN"),
         ("landmarks", [float("nan")] + [0.0] * 1403, "landmarks", "detected, but a landmark is not finite"),
+        ("projection", "orthographic", "camera", "projection differs"),
+        ("landmarks_exact", [700.0] * 1404, "exact landmarks", r"not R_C X \+ t"),
+        ("landmarks_visible", [True] * 468, "exact landmarks", "without an anchor is visible"),
         ("image_sha256", "0" * 64, "images", "SHA-256 differs"),
         ("image_path", "images/s1/neutral/y-30_p-20_r+10.png", "images", "not where its image belongs"),
         ("image_path", "../../secret.png", "images", "not where its image belongs"),
@@ -199,7 +203,7 @@ def test_another_schema(dataset):
     table = read_part(dataset / PART)
     pq.write_table(table.drop_columns(["quaternion"]), dataset / PART)
     problems = failures(verify_dataset(dataset))
-    assert problems["schema"] == f"{PART}: columns differ from schema 1.0.0: quaternion"
+    assert problems["schema"] == f"{PART}: columns differ from schema 1.1.0: quaternion"
     metadata = {**table.schema.metadata, b"headturn.configuration_digest": b"0"}
     pq.write_table(table.replace_schema_metadata(metadata), dataset / PART)
     assert "headturn.configuration_digest is '0', expected" in failures(verify_dataset(dataset))["schema"]
@@ -240,3 +244,49 @@ def test_a_changed_side_table(dataset):
 def test_not_a_dataset(tmp_path):
     report = verify_dataset(tmp_path / "nowhere")
     assert not report.ok and "run `headturn build` again" in report.text()
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        ("moved", "landmarks_exact is not R_C X + t of its anchors"),
+        ("lost", "s1/neutral: 2 points without an anchor, heads.parquet says 1"),
+        ("weights", "s1/neutral: weights do not add up to 1"),
+        ("head", "s1/neutral is missing"),
+        ("stranger", "s9/neutral is not in heads.parquet"),
+    ],
+)
+def test_wrong_anchors(dataset, damage, message):
+    anchors = read_anchors(dataset)
+    first = anchors.pop(("s1", "neutral"))
+    points, triangles, weights = first.points.copy(), first.triangles.copy(), first.weights.copy()
+    if damage == "moved":
+        points[0, 0] += 1e-3
+    elif damage == "lost":
+        points[0], triangles[0] = np.nan, -1
+    elif damage == "weights":
+        weights[0] = 0.5
+    subject = "s9" if damage == "stranger" else "s1"
+    if damage != "head":
+        anchors[subject, "neutral"] = replace(
+            first, subject=subject, points=points, triangles=triangles, weights=weights
+        )
+    write_anchors(list(anchors.values()), dataset)
+    write_manifest(read_manifest(dataset), dataset)
+    problems = failures(verify_dataset(dataset))
+    assert message in problems.get("anchors", "") + problems.get("exact landmarks", "")
+
+
+def test_the_rigid_fit_must_close(dataset):
+    """Rotation, quaternion, angles and grid agree; only the exact landmarks know better."""
+    report = verify_dataset(dataset)
+    assert 0 < report.closure_deg < 1e-5
+    exact = read_part(dataset / PART)["landmarks_exact"].to_pylist()
+    exact[0][2] += 1e-3
+    rewrite(dataset, {"landmarks_exact": exact}, honest=True)
+    assert "y-30_p-20_r+0: landmarks_exact is not" in failures(verify_dataset(dataset))["exact landmarks"]
+
+
+def test_no_anchors_table(dataset):
+    (dataset / "anchors.parquet").unlink()
+    assert "anchors.parquet: cannot be read" in failures(verify_dataset(dataset))["heads and poses"]

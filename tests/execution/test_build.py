@@ -10,61 +10,15 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from small_builds import Quiet, config_for, run
 
 from generator.dataset.manifest import MANIFEST_FILE, read_manifest
 from generator.dataset.verify import verify_dataset
 from generator.errors import DatasetError, HeadError
-from generator.execution.build import BuildResult, build
-from generator.execution.executor import LocalExecutor
+from generator.execution.build import build
+from generator.execution.local import LocalExecutor
 from generator.execution.open_executor import open_executor
-from generator.plan.config import BuildConfig, load_config
-
-SMALL = {
-    "poses": {"yaw": [-40, 40, 40], "pitch": [0, 0, 10], "roll": [0, 20, 20]},
-    "render": {"resolution": 96},
-    "dataset": {"unit_size": 4},
-}
-
-
-class Quiet:
-    """Remembers what was said."""
-
-    def __init__(self) -> None:
-        self.notes: list[str] = []
-        self.stages: dict[str, int] = {}
-        self.on_frame = lambda: None
-
-    def stage(self, name: str, total: int) -> None:
-        self.stages[name] = total
-
-    def advance(self, steps: int = 1) -> None:
-        self.on_frame()
-
-    def note(self, text: str) -> None:
-        self.notes.append(text)
-
-
-def config_for(source: Path | str, **sections: dict) -> BuildConfig:
-    merged = {name: {**SMALL.get(name, {}), **sections.get(name, {})} for name in {*SMALL, *sections}}
-    merged["heads"] = {"source": str(source), **merged.get("heads", {})}
-    return load_config(None, merged)
-
-
-def run(
-    config: BuildConfig, root: Path, executor: str = "local", reporter: Quiet | None = None
-) -> BuildResult:
-    with open_executor(executor) as lanes:
-        return build(config, root, lanes, reporter or Quiet())
-
-
-@pytest.fixture(scope="module")
-def built(parametric_heads: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[BuildConfig, Path]:
-    """Two heads x six poses, by the local executor."""
-    root = tmp_path_factory.mktemp("built") / "dataset"
-    config = config_for(parametric_heads)
-    result = run(config, root)
-    assert result.complete
-    return config, root
+from generator.plan.config import BuildConfig
 
 
 def test_a_build_verifies_and_shows_itself(built: tuple[BuildConfig, Path]) -> None:

@@ -6,17 +6,34 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.geometry.camera import Camera, framing_distance
+from generator.geometry.camera import Camera, Projection, framing_distance, project_with
 from generator.geometry.raycast import first_hits
-from generator.geometry.rigid import fit_similarity
+from generator.geometry.rigid import fit_rotations, fit_similarity
 from generator.geometry.rotation import rotation_from_angles
 
 
 def test_rays_invert_projection() -> None:
     camera = Camera(256, 85.0, 700.0)
     points = np.random.default_rng(0).uniform(-80, 80, (50, 3)) + camera.translation_mm
-    rays = camera.rays(camera.project(points))
+    origins, rays = camera.rays(camera.project(points))
+    assert not origins.any()
     assert np.allclose(rays * points[:, 2:], points)
+
+
+def test_orthographic_rays_are_parallel_and_agree_with_perspective_at_the_pivot() -> None:
+    flat, deep = Camera(256, 85.0, 700.0, "orthographic"), Camera(256, 85.0, 700.0)
+    points = np.random.default_rng(0).uniform(-80, 80, (50, 3)) + flat.translation_mm
+    origins, rays = flat.rays(flat.project(points))
+    assert np.allclose(rays, [0, 0, 1])
+    assert np.allclose(origins + rays * points[:, 2:], points)
+    points[:, 2] = 700.0
+    assert np.allclose(flat.project(points), deep.project(points))
+    assert np.allclose(flat.project([flat.view_mm / 2, 0, 123.0]), [256, 128])
+    for camera in (flat, deep):
+        pivot = np.array([np.nan if camera is deep else 700.0])
+        moved = points + np.array([0, 0, 5.0])
+        ours = project_with(camera.matrix[None], moved[None], pivot)
+        assert np.allclose(ours[0], camera.project(moved))
 
 
 def test_the_pivot_is_the_centre_of_the_image() -> None:
@@ -24,11 +41,12 @@ def test_the_pivot_is_the_centre_of_the_image() -> None:
     assert np.allclose(camera.project(camera.translation_mm), [100, 100])
 
 
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("lens", [20.0, 85.0, 135.0])
-def test_a_framed_sphere_stays_inside(lens: float) -> None:
+def test_a_framed_sphere_stays_inside(lens: float, projection: Projection) -> None:
     radius, directions = 140.0, np.random.default_rng(1).normal(size=(20_000, 3))
     sphere = radius * directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    camera = Camera(256, lens, framing_distance(radius, lens, 1.0))
+    camera = Camera(256, lens, framing_distance(radius, lens, 1.0, projection), projection)
     pixels = camera.project(sphere + camera.translation_mm)
     assert pixels.min() > 0
     assert pixels.max() < 256
@@ -74,3 +92,14 @@ def test_fit_never_mirrors() -> None:
 def test_fit_rejects_nonsense(source: np.ndarray, target: np.ndarray) -> None:
     with pytest.raises(ValueError, match=r"fit|expected"):
         fit_similarity(source, target)
+
+
+def test_many_rotations_at_once_are_those_of_one_fit_each() -> None:
+    rng = np.random.default_rng(8)
+    source = rng.normal(size=(30, 3))
+    rotations = rotation_from_angles(rng.uniform(-180, 180, (20, 3)))
+    targets = 2.5 * source @ np.swapaxes(rotations, 1, 2) + rng.normal(size=(20, 1, 3))
+    assert np.allclose(fit_rotations(source, targets), rotations)
+    noisy = targets + rng.normal(0, 0.5, targets.shape)
+    one_by_one = np.stack([fit_similarity(source, target).rotation for target in noisy])
+    assert np.allclose(fit_rotations(source, noisy), one_by_one)

@@ -38,12 +38,14 @@ def make_heads(
     seed: int,
     expressions: int = 0,
     progress: Callable[[str], None] | None = None,
+    keep: bool = False,
 ) -> list[Path]:
     """Write heads ``s<seed>p0000`` ... below out and return their folders.
 
     Head k of a seed is the same whatever count is, and so is expression j of a
     head whatever expressions is. A folder is complete or absent: each is written
-    beside its place and renamed. Folders that are already there are replaced.
+    beside its place and renamed. Folders that are already there are replaced,
+    or kept if they hold the expressions asked for and keep is set.
 
     Parameters
     ----------
@@ -67,9 +69,11 @@ def make_heads(
     _prepare(out)
     folders = []
     for index in range(count):
-        folder = out / f"s{seed}p{index:04d}"
+        folder = out / head_name(seed, index)
+        wanted = folder / f"{expression_name(expressions) if expressions else NEUTRAL}.obj"
         try:
-            _write_head(folder, seed, index, expressions)
+            if not (keep and wanted.is_file()):
+                _write_head(folder, seed, index, expressions)
         except OSError as error:
             reason = f"cannot be written ({error.strerror}); check space and permissions"
             raise HeadError(f"{folder}: {reason}") from error
@@ -77,6 +81,16 @@ def make_heads(
         if progress is not None:
             progress(folder.name)
     return folders
+
+
+def head_name(seed: int, index: int) -> str:
+    """Subject, and name of the folder, of head ``index`` of a seed."""
+    return f"s{seed}p{index:04d}"
+
+
+def expression_name(number: int) -> str:
+    """Name of a head's sampled expression, numbered from 1."""
+    return f"expression_{number:02d}"
 
 
 def sample_head(seed: int, index: int) -> tuple[Identity, Appearance, HeadShape]:
@@ -97,7 +111,7 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
     for number in range(expressions + 1):
         name, expression = NEUTRAL, NEUTRAL_EXPRESSION
         if number:
-            name = f"expression_{number:02d}"
+            name = expression_name(number)
             expression = sample_expression(np.random.default_rng([seed, index, 4, number]))
         write_mesh(work / f"{name}.obj", head_vertices(shape, expression), long_hair)
         described[name] = _describe_expression(f"{name}.obj", expression)

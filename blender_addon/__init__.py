@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Headturn in Blender: a side panel, the grid on the timeline, a Build button, a headless command.
+
+Thin adapters around the generator's own scene code and around the host, which
+does everything else; see docs/blender.md. Nothing heavy is imported here:
+numpy and the generator come in with the first click.
+"""
+
+from __future__ import annotations
+
+from . import command, operators, panel, preferences, properties, session, timeline
+
+_MODULES = (properties, preferences, operators, panel, timeline, command)
+
+
+def register() -> None:
+    """Called by Blender when the extension is enabled."""
+    for module in _MODULES:
+        module.register()
+
+
+def unregister() -> None:
+    """Called by Blender when the extension is disabled, and when Blender ends."""
+    session.close()
+    for module in reversed(_MODULES):
+        module.unregister()

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The build configuration as nested dictionaries, read from and written to the host's TOML.
+
+Blender has no TOML writer and no pydantic: values are carried as they are, also
+those that no panel shows, and the host checks them when a build starts.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from generator.errors import UsageError
+
+Config = dict[str, dict[str, Any]]
+SECTIONS = ("heads", "poses", "render", "landmarks", "dataset")
+
+
+def read_config(path: Path) -> Config:
+    """The tables of a configuration file.
+
+    Raises UsageError: it cannot be read, is not TOML, or holds something else.
+    """
+    import tomllib  # Blender 4.2 is the first with a Python that has it, and start-up is not slower for it
+
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: there is no such configuration file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise UsageError(f"{path}: not a TOML configuration: {error}") from error
+    for name, table in values.items():
+        if name not in SECTIONS or not isinstance(table, dict):
+            raise UsageError(f"{path}: [{name}] is none of the tables {', '.join(SECTIONS)}")
+    return values
+
+
+def write_config(config: Config, path: Path) -> None:
+    """Write a configuration, whole or not at all. UsageError if that is not possible."""
+    lines = []
+    for section in SECTIONS:
+        if table := config.get(section):
+            lines += [f"[{section}]", *(f"{key} = {_value(value)}" for key, value in table.items()), ""]
+    temporary = path.with_name(f".{path.name}.tmp")
+    try:
+        temporary.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str):
+        # JSON and TOML write strings alike but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    raise TypeError(f"no TOML for {value!r}")
+
+
+def merged(base: Config, shown: Config) -> Config:
+    """base with what the panel shows laid over it; a shown None removes the key."""
+    result = {}
+    for section in SECTIONS:
+        table = {**base.get(section, {}), **shown.get(section, {})}
+        if table := {key: value for key, value in table.items() if value is not None}:
+            result[section] = table
+    return result
+
+
+def number(value: float) -> float | int:
+    """A 32-bit number as it was typed: 0.1, not 0.10000000149011612."""
+    short = float(f"{value:.7g}")
+    return int(short) if short.is_integer() else short

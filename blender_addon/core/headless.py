@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``headturn`` commands from inside ``blender --background``: same host, same bytes, same exit codes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from generator.errors import HeadturnError
+
+from .host import check_host, find_host, host_command
+from .process import HostProcess
+from .progress import Progress
+
+LINE_EVERY_S = 5.0
+
+
+def run(arguments: Sequence[str], *, preference: str = "", blender: str = "") -> int:
+    """Carry out one headturn command on the host and return its exit code.
+
+    Progress of a build is printed to stdout a line at a time, for logs of a
+    render node; with --json the events themselves go there.
+    """
+    arguments = list(arguments) or ["--help"]
+    try:
+        configuration = next((Path(a) for a in arguments if a.endswith(".toml")), None)
+        beside = configuration.absolute().parent if configuration else Path.cwd()
+        host = find_host(preference, beside)
+        command = host_command(host, check_host(host), arguments, blender)
+        if arguments[0] == "build" and not {"--json", "--help"} & set(arguments):
+            return _build(command)
+        return _pass_through(command)
+    except HeadturnError as error:
+        print(f"headturn: {error}", file=sys.stderr, flush=True)
+        return error.exit_code
+
+
+def _pass_through(command: list[str]) -> int:
+    sys.stdout.flush()
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    while True:
+        try:
+            return _shell_code(process.wait())
+        except KeyboardInterrupt:  # the terminal has sent it to the host as well
+            continue
+
+
+def _build(command: list[str]) -> int:
+    process = HostProcess([*command, "--json"])
+    previous = signal.signal(signal.SIGTERM, lambda *_: process.interrupt())
+    progress, printed, last = Progress(), 0, ("", 0.0)
+    try:
+        while (code := process.exit_code) is None:
+            try:
+                for event in process.poll():
+                    progress.take(event)
+                while printed < len(progress.notes):
+                    print(progress.notes[printed], flush=True)
+                    printed += 1
+                now = time.monotonic()
+                if progress.total and (progress.stage != last[0] or now - last[1] >= LINE_EVERY_S):
+                    print(progress.line(), flush=True)
+                    last = (progress.stage, now)
+                time.sleep(0.05)
+            except KeyboardInterrupt:
+                process.interrupt()
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+        process.close()
+    if progress.result is not None:
+        result = progress.result
+        print(f"{progress.line()} in {result['seconds']:.0f} s: {result['dataset']}")
+        print(f"digest {result['digest']}", flush=True)
+    for line in process.log:
+        print(line, file=sys.stderr, flush=True)
+    return _shell_code(code)
+
+
+def _shell_code(code: int) -> int:
+    """A process that a signal ended has a negative code, which no shell can show."""
+    return 128 - code if code < 0 else code

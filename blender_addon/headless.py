@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``headturn`` commands in a Blender that does not have the extension:
+
+    blender --background --python-exit-code 1 --python blender_addon/headless.py -- build CONFIG.toml
+
+Takes the same arguments as ``headturn`` and ends with the same exit code.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+
+
+def main() -> int:
+    """Carry out what stands behind ``--``."""
+    folder = Path(__file__).resolve().parent
+    # The checkout, or the folder of an unpacked extension: its parts are a package either way.
+    sys.path.insert(0, str(folder.parent))
+    headless = import_module(f"{folder.name}.core.headless")
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    return headless.run(arguments, blender=bpy.app.binary_path)
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Blender would turn any exit code of ours into its own.
+    os._exit(code)

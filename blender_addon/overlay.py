@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawn over the 3D view: the head's frame and the landmarks. Shaders are made when first drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from . import session
+
+RED, GREEN, BLUE = (0.95, 0.2, 0.25, 1.0), (0.4, 0.8, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0)
+DOTS = (0.3, 1.0, 0.3, 1.0)
+LINE_WIDTH, DOT_SIZE = 2.5, 3.0
+_handles: list[tuple[Any, str]] = []
+
+
+def ensure() -> None:
+    """Draw from now on."""
+    if _handles or bpy.app.background:
+        return
+    for draw, when in ((_draw_axes, "POST_VIEW"), (_draw_landmarks, "POST_PIXEL")):
+        _handles.append((bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when), when))
+
+
+def remove() -> None:
+    """Draw no longer."""
+    while _handles:
+        handle, _ = _handles.pop()
+        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+
+
+def _draw_axes() -> None:
+    shown = bpy.context.scene.headturn
+    if shown.head is None or not shown.show_axes or not bpy.context.space_data.overlay.show_overlays:
+        return
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    from . import studio
+
+    pivot, *ends = studio.head_axes(shown).tolist()
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    region = bpy.context.region
+    shader.uniform_float("viewportSize", (region.width, region.height))
+    shader.uniform_float("lineWidth", LINE_WIDTH)
+    gpu.state.depth_test_set("NONE")
+    gpu.state.blend_set("ALPHA")
+    for end, color in zip(ends, (RED, GREEN, BLUE), strict=True):
+        shader.uniform_float("color", color)
+        batch_for_shader(shader, "LINES", {"pos": (pivot, end)}).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def _draw_landmarks() -> None:
+    from . import studio
+
+    shown, found = bpy.context.scene.headturn, session.state.landmarks
+    if shown.head is None or not shown.show_landmarks or found is None:
+        return
+    angles, points = found
+    frame = _camera_frame()
+    if points is None or angles != studio.pose(shown) or frame is None:
+        return
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    left, bottom, width, height = frame
+    side = shown.resolution
+    places = [(left + x / side * width, bottom + (1 - y / side) * height) for x, y in points]
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", DOTS)
+    gpu.state.point_size_set(DOT_SIZE)
+    batch_for_shader(shader, "POINTS", {"pos": places}).draw(shader)
+
+
+def _camera_frame() -> tuple[float, float, float, float] | None:
+    """(left, bottom, width, height) of the camera's image in the region; None if it is not looked through."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+    context = bpy.context
+    scene, view = context.scene, context.region_data
+    if scene.camera is None or view is None or view.view_perspective != "CAMERA":
+        return None
+    corners = scene.camera.data.view_frame(scene=scene)
+    places = [
+        location_3d_to_region_2d(context.region, view, scene.camera.matrix_world @ corner)
+        for corner in corners
+    ]
+    if any(place is None for place in places):
+        return None
+    xs, ys = [p.x for p in places], [p.y for p in places]
+    return min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys)

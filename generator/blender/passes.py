@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Geometry of what is seen, pixel by pixel: Blender's render passes as one multilayer OpenEXR."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from generator.blender import compat
+
+SWITCHES = {
+    "depth": "use_pass_z",
+    "normal": "use_pass_normal",
+    "position": "use_pass_position",
+    "uv": "use_pass_uv",
+    "object_index": "use_pass_object_index",
+}
+"""Pass to the view layer's property; the same in Blender 4.2 to 5.x."""
+
+HEAD_INDEX = 1
+
+CENTRE_ONLY = 0.01
+"""Blender's narrowest pixel filter, in pixels: the one sample lies at the pixel's centre."""
+
+
+def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> None:
+    """Render passes of the scene as it stands into path, as Blender names them.
+
+    Where there is no surface object_index is 0, so it is always among them. Raises KeyError
+    for a pass that is none of :data:`SWITCHES`.
+    """
+    scene = bpy.context.scene
+    render = scene.render
+    head.pass_index = HEAD_INDEX
+    layer = scene.view_layers[0]
+    wanted = {SWITCHES[name] for name in (*passes, "object_index")}
+    with _restored(scene.cycles, "samples", "pixel_filter_type", "filter_width"):
+        for switch in SWITCHES.values():
+            setattr(layer, switch, switch in wanted)
+        scene.cycles.samples = 1
+        scene.cycles.pixel_filter_type = "BOX"
+        scene.cycles.filter_width = CENTRE_ONLY
+        compat.use_multilayer(render.image_settings)
+        render.use_border = False
+        render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+    for switch in SWITCHES.values():
+        setattr(layer, switch, False)
+
+
+@contextmanager
+def _restored(owner: bpy.types.bpy_struct, *names: str) -> Iterator[None]:
+    before = {name: getattr(owner, name) for name in names}
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(owner, name, value)

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The folders of images that the published code of NLML-HPE reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from generator.dataset.export.numbered import head_numbers, write_identities
+from generator.dataset.export.source import Source, require_images
+from generator.errors import UsageError
+
+ABOUT = """\
+`<id>/ID<id>_(<yaw>_<pitch>_<roll>).jpg`, whole degrees, as the published code of NLML-HPE looks for
+them; `identities.csv` says which head each id is. The code sorts the folders as numbers, so ids are
+numbers: the subject's own where all subjects are numbers with one expression each, else counted from 1.
+
+The pose in a name is R_C = Rx(-pitch) Ry(yaw) Rz(roll) in the camera frame. There are no landmarks here:
+the code runs its own detector, so an image on which ours found no face has an exact label all the same.
+"""
+
+
+def write(source: Source, folder: Path) -> str:
+    """Write the export; returns what its README says about it.
+
+    Raises UsageError: a pose is not in whole degrees. DatasetError: there are no images.
+    """
+    require_images(source, "nlml-hpe")
+    numbers = head_numbers(source.heads, keep_numbers=True)
+    for sample in source.samples():
+        angles = sample.angles_deg.tolist()
+        if any(angle != int(angle) for angle in angles):
+            raise UsageError(
+                f"{source.root}: the pose of {sample.sample_id} is not in whole degrees, and nlml-hpe names "
+                "its files by whole degrees; build over a grid of whole degrees, or take another format"
+            )
+        number = numbers[sample.head]
+        yaw, pitch, roll = (int(angle) for angle in angles)
+        path = folder / str(number) / f"ID{number}_({yaw}_{pitch}_{roll}).jpg"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(sample.jpeg())
+    write_identities(source.heads, numbers, folder)
+    return ABOUT

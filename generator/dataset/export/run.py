@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One entry for all formats: check, gate, write, and only then put into place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from generator.dataset.card import CARD_FILE
+from generator.dataset.export import biwi, coco, croissant, huggingface, nlml_hpe, sixdrepnet, w300_lp
+from generator.dataset.export.licence import check_licences
+from generator.dataset.export.options import ExportOptions, Missing
+from generator.dataset.export.readme import readme
+from generator.dataset.export.source import Source
+from generator.dataset.export.target import new_folder
+from generator.dataset.heads_table import HeadRow, read_heads
+from generator.dataset.manifest import read_manifest
+from generator.dataset.schema import LANDMARKS
+from generator.errors import UsageError
+
+Exporter = Callable[[Source, Path], str]
+"""Writes the rows of a source into a folder; returns what README.md says about the format, or "" if
+it wrote one itself."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """missing: the choices for rows without what the format needs; the first is the default.
+
+    landmarks: does it hold any? public: is it meant for publication?
+    """
+
+    write: Exporter
+    missing: tuple[Missing, ...] = ("keep", "skip", "fail")
+    landmarks: bool = False
+    images: bool = True
+    public: bool = False
+
+
+_NEEDS_POINTS: tuple[Missing, ...] = ("fail", "skip", "exact")
+
+FORMATS = {
+    "nlml-hpe": Format(nlml_hpe.write),
+    "300w-lp": Format(w300_lp.write, _NEEDS_POINTS, landmarks=True),
+    "6drepnet": Format(sixdrepnet.write),
+    "biwi": Format(biwi.write),
+    "huggingface": Format(huggingface.write, public=True),
+    "croissant": Format(croissant.write, public=True),
+    "coco": Format(coco.write, _NEEDS_POINTS, landmarks=True),
+}
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What an export holds. landmarks: "exact", "detected" or "" for a format without any.
+
+    left_out: rows without a detection or landmarks. withheld: rows that may not be published.
+    """
+
+    target: Path
+    format: str
+    rows: int
+    heads: int
+    left_out: int
+    filled: int
+    withheld: int
+    landmarks: str
+
+
+def export_dataset(
+    root: Path,
+    name: str,
+    target: Path,
+    options: ExportOptions | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Exported:
+    """Write a finished dataset in another form.
+
+    name: one of FORMATS. target: a folder that is new or empty; it is there in full or not at all.
+    progress: called with the number of rows that were read.
+
+    Raises
+    ------
+    UsageError: no such format or choice, the target is not empty, rows may not
+        be published, or rows lack what the format needs.
+    DatasetError: the dataset is not finished, of another version, or damaged; it has
+        no images and the format needs them; the target cannot be written.
+    """
+    root, target, options = Path(root), Path(target), options or ExportOptions()
+    if name not in FORMATS:
+        raise UsageError(f"--format {name!r}: expected one of {', '.join(FORMATS)}")
+    chosen = FORMATS[name]
+    manifest = read_manifest(root)
+    missing = options.missing or chosen.missing[0]
+    if missing not in chosen.missing:
+        raise UsageError(f"--missing {missing}: {name} takes one of {', '.join(chosen.missing)}")
+    public = options.public or chosen.public
+    heads, kept_back = check_licences(root, manifest, read_heads(root), options, public)
+    source = Source(
+        root=root,
+        manifest=manifest,
+        heads=heads,
+        options=options,
+        landmarks=_landmarks(root, heads, options.landmarks) if chosen.landmarks else "",
+        missing=missing,
+        wants_images=chosen.images,
+        progress=progress or (lambda _: None),
+    )
+    with new_folder(target, root) as folder:
+        about = chosen.write(source, folder)
+        if not source.rows:
+            raise UsageError(f"{root}: no row is left to export; choose another --missing or --landmarks")
+        if about:
+            (folder / CARD_FILE).write_text(readme(source, name, about), encoding="utf-8")
+    withheld = kept_back.rows if options.only_redistributable else 0
+    return Exported(
+        target, name, source.rows, len(heads), source.left_out, source.filled, withheld, source.landmarks
+    )
+
+
+def _landmarks(root: Path, heads: list[HeadRow], choice: str) -> str:
+    """Where the landmarks come from: one answer for the whole export."""
+    without = [f"{head.subject}/{head.expression}" for head in heads if head.anchor_absent == LANDMARKS]
+    if choice == "exact" and len(without) == len(heads):
+        raise UsageError(
+            f"{root}: no head has exact landmarks (first: {without[0]}); take --landmarks detected"
+        )
+    if choice == "auto":
+        return "detected" if without else "exact"
+    return choice

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The table itself, filtered, with its images inside: what huggingface and croissant share."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from generator.dataset.export.sample import suffix_of
+from generator.dataset.export.source import Source
+from generator.dataset.heads_table import write_heads
+from generator.dataset.open import image_bytes
+from generator.dataset.part import part_schema_of, write_table
+from generator.dataset.schema import IMAGE_FIELD
+
+LOCAL_ONLY = ("image_path", "passes_path", "passes_sha256")
+"""Columns that point at files which do not travel with the table."""
+
+
+def write_tables(source: Source, folder: Path) -> Counter[str]:
+    """Write data/<split>/part-*.parquet and heads.parquet; returns the number of rows of each split.
+
+    Raises
+    ------
+    DatasetError: a part or an image is missing or damaged.
+    UsageError: a row was not detected and missing = "fail".
+    """
+    rows: Counter[str] = Counter()
+    schema = exported_schema(source)
+    for part in source.parts:
+        batches = [_exported(source, batch, schema) for batch in _kept(source, part)]
+        if not batches:
+            continue
+        path = folder / part.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        table = pa.Table.from_batches(batches, schema=schema)
+        with path.open("wb") as file:
+            write_table(table, file)
+        rows[part.path.split("/")[1]] += len(table)
+    write_heads(source.heads, folder)
+    return rows
+
+
+def exported_schema(source: Source) -> pa.Schema:
+    """The schema of the parts, with the features of every column in its Hugging Face metadata."""
+    original = part_schema_of(source.root / source.parts[0].path)
+    fields = [field for field in original if field.name not in (*LOCAL_ONLY, IMAGE_FIELD.name)]
+    if source.has_images:
+        fields.append(IMAGE_FIELD)
+    schema = pa.schema(fields)
+    features = {field.name: feature(field) for field in schema}
+    metadata = {
+        **original.metadata,
+        b"headturn.images": b"embedded" if source.has_images else b"none",
+        b"huggingface": json.dumps({"info": {"features": features}}).encode(),
+    }
+    return schema.with_metadata(metadata)
+
+
+def feature(field: pa.Field) -> dict[str, Any]:
+    """The feature of Hugging Face datasets that a column is."""
+    if field.name == IMAGE_FIELD.name:
+        return {"_type": "Image"}
+    if pa.types.is_fixed_size_list(field.type):
+        inner = feature(field.type.value_field)
+        return {"feature": inner, "length": field.type.list_size, "_type": "Sequence"}
+    return {"dtype": dtype_name(field.type), "_type": "Value"}
+
+
+def dtype_name(kind: pa.DataType) -> str:
+    """What Hugging Face calls a scalar type."""
+    return {"double": "float64", "float": "float32"}.get(str(kind), str(kind))
+
+
+def _kept(source: Source, part: Any) -> Iterator[pa.RecordBatch]:
+    for batch in source.batches([part]):
+        kept = source.kept(batch)
+        if len(kept):
+            yield kept
+
+
+def _exported(source: Source, batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    columns = [batch.column(field.name) for field in schema if field.name != IMAGE_FIELD.name]
+    if source.has_images:
+        embedded = source.manifest.images == "embedded"
+        images = []
+        for name, row in zip(
+            batch.column("sample_id").to_pylist(),
+            batch.select(["image_path", *(["image"] if embedded else [])]).to_pylist(),
+            strict=True,
+        ):
+            encoded = image_bytes(source.root, row)
+            suffix = suffix_of(row["image_path"] or row["image"]["path"], encoded)
+            images.append({"bytes": encoded, "path": name.replace("/", "_") + suffix})
+        columns.append(pa.array(images, IMAGE_FIELD.type))
+    return pa.record_batch(columns, schema=schema)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Passes of an image as multilayer OpenEXR, with the same names whatever Blender made them.
+
+Linear, frame C, metres; see docs/passes.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from generator.errors import DatasetError, UsageError, WorkerError
+
+PassName = Literal["depth", "normal", "position", "uv", "object_index"]
+PASSES: tuple[PassName, ...] = get_args(PassName)
+
+CHANNELS: dict[str, tuple[str, ...]] = {
+    "depth": ("Z",),
+    "normal": ("X", "Y", "Z"),
+    "position": ("X", "Y", "Z"),
+    "uv": ("U", "V"),
+    "object_index": ("X",),
+}
+
+_BLENDER_NAMES = {
+    "depth": ("Depth",),
+    "normal": ("Normal",),
+    "position": ("Position",),
+    "uv": ("UV",),
+    "object_index": ("IndexOB", "Object Index"),
+}
+"""As the layers are called by Blender 4.x, then by 5.x where it differs."""
+
+_HEADER = {
+    "headturn.frame": "C (camera): x image-right, y image-down, z into the scene",
+    "headturn.units": "depth and position in metres; normal of length 1; no surface is NaN",
+}
+
+
+def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -> dict[str, np.ndarray]:
+    """What Blender wrote, in frame C and metres: {"depth.Z": float32 [H, W], ...}.
+
+    passes: those of :data:`PASSES` that are wanted. distance_mm: camera to pivot.
+    Pixels without a surface are NaN, and 0 in object_index.
+    Raises WorkerError if a pass is not in the file.
+    """
+    layers = _layers(read_channels(path))
+
+    def layer(name: str, count: int) -> np.ndarray:
+        for alias in _BLENDER_NAMES[name]:
+            if alias in layers:
+                channels = layers[alias]
+                keys = [next((c for c in options if c in channels), "") for options in _AXES[name][:count]]
+                if all(keys):
+                    return np.stack([channels[key] for key in keys], axis=-1).astype(np.float32)
+        raise WorkerError(f"{path}: no pass {name!r} among {', '.join(sorted(layers))}")
+
+    index = layer("object_index", 1)
+    nothing = index[..., 0] == 0
+    made: dict[str, np.ndarray] = {}
+    for name in passes:
+        values = index if name == "object_index" else layer(name, len(CHANNELS[name]))
+        if name in ("normal", "position"):
+            x, y, z = np.moveaxis(values, -1, 0)
+            values = np.stack([x, -z, y], axis=-1)  # frame B to frame C
+        if name == "position":
+            values[..., 2] += np.float32(distance_mm * 1e-3)
+        if name != "object_index":
+            values = np.where(nothing[..., None], np.float32("nan"), values)
+        for place, channel in enumerate(CHANNELS[name]):
+            made[f"{name}.{channel}"] = np.ascontiguousarray(values[..., place])
+    return made
+
+
+_AXES: dict[str, tuple[tuple[str, ...], ...]] = {
+    "depth": (("Z", "V"),),
+    "normal": (("X",), ("Y",), ("Z",)),
+    "position": (("X",), ("Y",), ("Z",)),
+    "uv": (("U", "X"), ("V", "Y")),
+    "object_index": (("X", "V"),),
+}
+
+
+def write_passes(channels: Mapping[str, np.ndarray], path: Path) -> None:
+    """Write channels as OpenEXR with ZIP compression; the same channels give the same bytes."""
+    exr = _openexr()
+    header: dict[str, Any] = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, **_HEADER}
+    with exr.File(header, {name: channels[name] for name in sorted(channels)}) as file:
+        file.write(str(path))
+
+
+def read_channels(path: Path) -> dict[str, np.ndarray]:
+    """Every channel of an OpenEXR by its full name, float32 [H, W].
+
+    Raises DatasetError if the file is missing, damaged or no OpenEXR.
+    """
+    exr = _openexr()
+    if not path.is_file():
+        raise DatasetError(f"{path}: is missing; run `headturn build` again")
+    try:
+        with exr.File(str(path), separate_channels=True) as file:
+            # Blender 5 writes a part a pass, 4.x one part with all of them.
+            parts = [part.channels for part in file.parts]
+            return {name: np.array(found.pixels) for part in parts for name, found in part.items()}
+    except RuntimeError as error:
+        raise DatasetError(f"{path}: not a readable OpenEXR; run `headturn build` again") from error
+
+
+def passes_sha256(channels: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of the decoded floats: each channel's name and little-endian float32, sorted by name."""
+    digest = hashlib.sha256()
+    for name in sorted(channels):
+        values = np.array(channels[name], dtype="<f4")
+        values[np.isnan(values)] = np.nan
+        digest.update(f"{name}:{values.shape[0]}x{values.shape[1]}\n".encode())
+        digest.update(values.tobytes())
+    return digest.hexdigest()
+
+
+def _layers(channels: Mapping[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
+    """Channels by the name of their pass: "ViewLayer.Depth.Z" is layer Depth, channel Z."""
+    layers: dict[str, dict[str, np.ndarray]] = {}
+    for name, values in channels.items():
+        *_, layer, channel = ("", *name.split("."))
+        layers.setdefault(layer, {})[channel] = values
+    return layers
+
+
+def _openexr() -> Any:
+    try:
+        import OpenEXR
+    except ImportError as error:
+        raise UsageError(
+            f"passes need the OpenEXR package ({error}): pip install 'headturn[build]'"
+        ) from error
+    return OpenEXR

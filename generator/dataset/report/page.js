@@ -1,0 +1,362 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const $ = (id) => document.getElementById(id);
+  const SVG = "http://www.w3.org/2000/svg";
+  // Viridis, a light-to-dark ramp for errors and a blue-to-orange one for signs: all three keep their
+  // order for every kind of colour vision, and in grey.
+  const FOUND = ["#440154", "#443983", "#31688e", "#21918c", "#35b779", "#90d743", "#fde725"];
+  const ERROR = ["#fdf5ea", "#f9d3b0", "#f2a07a", "#df6553", "#b23058", "#71205f", "#2e1237"];
+  const SIGNED = ["#0b4f8a", "#5b93c4", "#b9d2e6", "#f4f2ee", "#f1c9a5", "#d98a45", "#994a00"];
+
+  function make(tag, options = {}, ...children) {
+    const node = document.createElement(tag);
+    for (const [key, value] of Object.entries(options)) {
+      if (key === "text") node.textContent = value;
+      else if (key === "class") node.className = value;
+      else node.setAttribute(key, value);
+    }
+    node.append(...children);
+    return node;
+  }
+  function shape(tag, options) {
+    const node = document.createElementNS(SVG, tag);
+    for (const [key, value] of Object.entries(options)) node.setAttribute(key, value);
+    return node;
+  }
+  const percent = (share, digits = 1) => (100 * share).toFixed(digits) + "\u00a0%";
+  const whole = (number) => number.toLocaleString("en-US");
+  const images = (number) => `${whole(number)} ${number === 1 ? "image" : "images"}`;
+  const degrees = (angle) => (angle > 0 ? "+" : angle < 0 ? "−" : "") + Math.abs(angle) + "°";
+  const minus = (text) => text.replace("-", "−");
+  function short(value) {
+    const size = Math.abs(value);
+    return minus(size < 9.95 ? value.toFixed(1) : value.toFixed(0)).replace(/^−(0|0\.0)$/, "$1");
+  }
+
+  function mix(stops, share) {
+    const place = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
+    const k = Math.min(Math.floor(place), stops.length - 2);
+    const channel = (hex, i) => parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16);
+    return [0, 1, 2].map((i) =>
+      Math.round(channel(stops[k], i) + (place - k) * (channel(stops[k + 1], i) - channel(stops[k], i))));
+  }
+  function paint(node, stops, share) {
+    const rgb = mix(stops, share);
+    const linear = rgb.map((c) => Math.pow(c / 255, 2.2));
+    const light = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+    node.style.background = `rgb(${rgb.join(",")})`;
+    node.style.color = light > 0.2 ? "#10161d" : "#ffffff";
+  }
+  function legend(node, stops, low, high) {
+    const bar = make("i");
+    bar.style.background = `linear-gradient(to right, ${stops.join(",")})`;
+    node.replaceChildren(make("span", { text: low }), bar, make("span", { text: high }));
+  }
+  function rows(table, entries) {
+    table.replaceChildren(...entries.map(([name, value]) =>
+      make("tr", {}, make("th", { scope: "row", text: name }), make("td", { text: value }))));
+  }
+
+  // ---- sums over cells -------------------------------------------------
+  const { yaw, pitch, roll } = data.axes;
+  const state = { pick: 0, roll: 0, measure: "distance", region: 0 };
+  const cell = (i, j, k) => (i * pitch.length + j) * roll.length + k;
+  const rollsShown = () => (state.roll === 0 ? roll.map((_, k) => k) : [state.roll - 1]);
+  const cellsAt = (i, j) => rollsShown().map((k) => cell(i, j, k));
+  const everyCell = () => yaw.flatMap((_, i) => pitch.flatMap((_, j) => cellsAt(i, j)));
+  const sum = (values, cells) => cells.reduce((total, c) => total + values[c], 0);
+  function mean(values, weights, cells) {
+    const weight = sum(weights, cells);
+    if (!weight) return null;
+    return cells.reduce((total, c) => total + (weights[c] ? weights[c] * values[c] : 0), 0) / weight;
+  }
+  // Spread of the union: mean of squares minus square of the mean, along every axis that is given.
+  function spread(sd, means, weights, cells) {
+    const weight = sum(weights, cells);
+    if (!weight) return null;
+    const square = cells.reduce((total, c) => total + (weights[c]
+      ? weights[c] * means.reduce((s, m) => s + m[c] * m[c], sd[c] * sd[c]) : 0), 0) / weight;
+    const centre = means.reduce((s, m) => s + mean(m, weights, cells) ** 2, 0);
+    return Math.sqrt(Math.max(0, square - centre));
+  }
+  const part = () => data.maps[state.pick].regions[state.region];
+  const map = () => data.maps[state.pick];
+  const AXES = ["yaw", "pitch", "roll"];
+  const MEASURES = {
+    distance: { name: "distance, px", unit: "\u00a0px", of: (c) => mean(part().distance, part().rows, c) },
+    dx: { name: "shift to image right, px", unit: "\u00a0px", signed: true, of: (c) => mean(part().dx, part().rows, c) },
+    dy: { name: "shift down, px", unit: "\u00a0px", signed: true, of: (c) => mean(part().dy, part().rows, c) },
+    spread: { name: "spread about the mean shift, px", unit: "\u00a0px",
+      of: (c) => spread(part().spread, [part().dx, part().dy], part().rows, c) },
+    geodesic: { name: "pose error, degrees", unit: "°", pose: true, of: (c) => mean(map().geodesic, map().compared, c) },
+  };
+  AXES.forEach((name, a) => {
+    MEASURES[name] = { name: `${name}: mean error, degrees`, unit: "°", pose: true, signed: true,
+      of: (c) => mean(map().turn[a], map().compared, c) };
+    MEASURES[`${name}_spread`] = { name: `${name}: spread, degrees`, unit: "°", pose: true,
+      of: (c) => spread(map().turn_spread[a], [map().turn[a]], map().compared, c) };
+  });
+
+  // ---- maps ------------------------------------------------------------
+  function drawMap(table, readout, value, label, stops, share, describe) {
+    const previous = table.contains(document.activeElement) ? document.activeElement.dataset.at : null;
+    table.classList.toggle("dense", yaw.length > 16);
+    const lines = [];
+    for (let j = pitch.length - 1; j >= 0; j--) {
+      const line = make("tr", {}, make("th", { scope: "row", class: "side", text: degrees(pitch[j]) }));
+      yaw.forEach((_, i) => {
+        const cells = cellsAt(i, j);
+        const number = value(cells);
+        const td = make("td", { tabindex: lines.length || i ? -1 : 0, "data-at": `${i},${j}` });
+        if (number === null) {
+          td.className = "none";
+        } else {
+          td.textContent = label(number);
+          td.dataset.value = number;
+          paint(td, stops, share(number));
+        }
+        const say = () => { readout.textContent = describe(i, j, cells, number); };
+        td.addEventListener("mouseenter", say);
+        td.addEventListener("focus", say);
+        line.append(td);
+      });
+      lines.push(line);
+    }
+    const heads = yaw.map((angle) => make("th", { scope: "col", text: degrees(angle) }));
+    const foot = make("tr", {}, make("th", { class: "side" }), ...heads);
+    const note = `yaw to the right, pitch upwards${data.binned ? "; cells of 10°" : ""}`;
+    table.replaceChildren(make("caption", { text: note }), make("tbody", {}, ...lines, foot));
+    if (previous) table.querySelector(`[data-at="${previous}"]`).focus();
+  }
+  function arrows(event) {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const at = event.target.dataset.at;
+    if (!step || !at) return;
+    const [i, j] = at.split(",").map(Number);
+    const next = event.currentTarget.querySelector(`[data-at="${i + step[0]},${j + step[1]}"]`);
+    if (next) { next.focus(); event.preventDefault(); }
+  }
+  const where = (i, j) => `Yaw ${degrees(yaw[i])}, pitch ${degrees(pitch[j])}, ` +
+    (state.roll ? `roll ${degrees(roll[state.roll - 1])}` : "all rolls");
+
+  function drawDetection() {
+    const m = map();
+    const rate = (cells) => { const n = sum(m.rows, cells); return n ? sum(m.detected, cells) / n : null; };
+    drawMap($("detection"), $("detection-readout"), rate, (r) => (100 * r).toFixed(0), FOUND, (r) => r,
+      (i, j, cells, r) => `${where(i, j)}: ` + (r === null ? "no images"
+        : `${whole(sum(m.detected, cells))} of ${whole(sum(m.rows, cells))} faces found, ${percent(r)}`));
+    legend($("detection-legend"), FOUND, "0 %", "100 %");
+    const all = everyCell();
+    $("detection-readout").textContent = `${data.picks[state.pick]}, ` +
+      (state.roll ? `roll ${degrees(roll[state.roll - 1])}` : "all rolls") +
+      `: ${whole(sum(m.detected, all))} of ${whole(sum(m.rows, all))} faces found, ${percent(rate(all) ?? 0)}`;
+  }
+
+  function drawAtlas() {
+    const measure = MEASURES[state.measure];
+    $("region").disabled = Boolean(measure.pose);
+    const values = yaw.flatMap((_, i) => pitch.map((_, j) => measure.of(cellsAt(i, j)))).filter((v) => v !== null);
+    const top = Math.max(...values.map(Math.abs), 1e-9);
+    const share = measure.signed ? (v) => 0.5 + v / (2 * top) : (v) => v / top;
+    const say = (v) => (v === null ? "nothing to compare" : minus(v.toFixed(2)) + measure.unit);
+    const counts = measure.pose ? map().compared : part().rows;
+    drawMap($("atlas"), $("atlas-readout"), measure.of, short, measure.signed ? SIGNED : ERROR, share,
+      (i, j, cells, v) => {
+        const means = ["geodesic", ...AXES].map((key) => `${key === "geodesic" ? "pose error" : key} ${
+          minus((MEASURES[key].of(cells) ?? NaN).toFixed(2))}°`);
+        return `${where(i, j)}: ${measure.name.split(",")[0]} ${say(v)} (${images(sum(counts, cells))})` +
+          (v === null ? "" : "; " + means.join(", "));
+      });
+    const end = top.toFixed(1) + measure.unit;
+    legend($("atlas-legend"), measure.signed ? SIGNED : ERROR, measure.signed ? "−" + end : "0", end);
+    const whom = measure.pose ? "" : `, ${data.regions[state.region]}`;
+    $("atlas-readout").textContent =
+      `${data.picks[state.pick]}${whom}, all cells shown: ${measure.name.split(",")[0]} ${say(measure.of(everyCell()))}`;
+  }
+
+  function drawRegions() {
+    const cells = everyCell();
+    const kept = state.region;
+    const lines = data.regions.map((name, k) => {
+      state.region = k;
+      return [name, ...["distance", "dx", "dy", "spread"].map((key) => MEASURES[key].of(cells))];
+    });
+    state.region = kept;
+    const top = Math.max(...lines.map((line) => line[1] ?? 0), 1e-9);
+    const title = ["part", "", "distance", "right", "down", "spread"].map((text, k) =>
+      make("th", { scope: "col", class: k > 1 ? "number" : "", text }));
+    const body = lines.map(([name, ...values]) => {
+      const bar = make("div", { class: "bar" }, make("b", { style: `width:${(100 * (values[0] ?? 0)) / top}%` }));
+      return make("tr", { "data-region": name }, make("th", { scope: "row", text: name }),
+        make("td", { class: "barcell" }, bar),
+        ...values.map((v) => make("td", { class: "number", "data-value": v ?? "",
+          text: v === null ? "–" : minus(v.toFixed(2)) })));
+    });
+    $("regions").replaceChildren(make("tr", {}, ...title), ...body);
+  }
+
+  function redraw() {
+    $("roll-value").textContent = state.roll ? degrees(roll[state.roll - 1]) : "all rolls";
+    $("roll").setAttribute("aria-valuetext", $("roll-value").textContent);
+    drawDetection();
+    if (data.why_no_atlas) return;
+    drawAtlas();
+    drawRegions();
+  }
+
+  function setUpMaps() {
+    data.picks.forEach((name, k) => $("pick").append(make("option", { value: k, text: name })));
+    Object.entries(MEASURES).forEach(([key, m]) => $("measure").append(make("option", { value: key, text: m.name })));
+    data.regions.forEach((name, k) => $("region").append(make("option", { value: k, text: name })));
+    $("roll").max = roll.length > 1 ? roll.length : 0;
+    $("roll").disabled = roll.length < 2;
+    $("pick").addEventListener("change", (e) => { state.pick = Number(e.target.value); redraw(); });
+    $("roll").addEventListener("input", (e) => { state.roll = Number(e.target.value); redraw(); });
+    $("measure").addEventListener("change", (e) => { state.measure = e.target.value; redraw(); });
+    $("region").addEventListener("change", (e) => { state.region = Number(e.target.value); redraw(); });
+    $("detection").addEventListener("keydown", arrows);
+    $("atlas").addEventListener("keydown", arrows);
+    if (data.why_no_atlas) {
+      $("atlas-card").remove(); $("regions-card").remove(); $("face").remove();
+      document.querySelector('nav a[href="#face"]').remove();
+      $("why").hidden = false;
+      $("why").textContent = data.why_no_atlas;
+    } else {
+      $("regions-note").textContent = "Mean over the images chosen above, pixels: how far a detected landmark " +
+        "lies from the same point anchored on the mesh, which way on average, and how much it scatters about that.";
+    }
+    redraw();
+  }
+
+  // ---- face ------------------------------------------------------------
+  function setUpFace() {
+    const p = data.points;
+    const there = p.x.map((x, k) => (x === null ? -1 : k)).filter((k) => k >= 0);
+    const xs = there.map((k) => p.x[k]), ys = there.map((k) => p.y[k]);
+    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    const svg = $("facemap"), pad = 14;
+    svg.setAttribute("viewBox", `${left - pad} ${top - pad} ${right - left + 2 * pad} ${bottom - top + 2 * pad}`);
+    const sorted = there.map((k) => p.distance[k]).sort((a, b) => a - b);
+    const high = Math.max(sorted[Math.floor(0.98 * (sorted.length - 1))], 1e-9);  // a few outliers hide the rest
+    const longest = Math.max(...there.map((k) => Math.hypot(p.dx[k], p.dy[k])), 1e-9);
+    const times = Math.max(1, Math.round(0.07 * (bottom - top) / longest));
+    const lines = shape("g", { id: "shifts" }), dots = shape("g", {});
+    for (const k of there) {
+      lines.append(shape("line", { x1: p.x[k], y1: p.y[k], x2: p.x[k] + times * p.dx[k], y2: p.y[k] + times * p.dy[k] }));
+      const dot = shape("circle", { cx: p.x[k], cy: p.y[k], r: 1.6, fill: `rgb(${mix(ERROR, p.distance[k] / high).join(",")})`,
+        "data-point": k, "data-value": p.distance[k] });
+      dot.addEventListener("mouseenter", () => {
+        $("face-readout").textContent = `Landmark ${k}: distance ${p.distance[k].toFixed(2)} px; mean shift ` +
+          minus(`${p.dx[k].toFixed(2)} right, `) + minus(`${p.dy[k].toFixed(2)} down, px in the head's frame`);
+      });
+      dots.append(dot);
+    }
+    svg.append(lines, dots);
+    $("shift-scale").textContent = String(times);
+    $("show-shift").addEventListener("change", (e) => { lines.style.display = e.target.checked ? "" : "none"; });
+    legend($("face-legend"), ERROR, "0", `${high.toFixed(1)} px and more`);
+    $("face-note").textContent = `Mean distance of each landmark over the ${images(data.overall.compared)} in which ` +
+      "a face was found. The pose is undone, so a line is what the detector gets wrong in the same way however the " +
+      "head turns. Image left is the subject's right.";
+  }
+
+  // ---- images ----------------------------------------------------------
+  function setUpSheet() {
+    const sheet = data.sheet;
+    if (!sheet) {
+      $("sheet-note").textContent = "Built with images = none, so there is nothing to show.";
+      $("overlays").remove();
+      return;
+    }
+    $("sheet-note").textContent = `${sheet.heads.length} of ${whole(data.heads_count)} heads, ${sheet.poses.length} of ` +
+      `${whole(data.poses)} poses (yaw, pitch, roll), with the outlines of eyes, brows, nose, mouth and face.`;
+    const grid = $("sheet");
+    grid.style.gridTemplateColumns = `minmax(74px, 110px) repeat(${sheet.poses.length}, 1fr)`;
+    grid.append(make("span"), ...sheet.poses.map((pose) =>
+      make("span", { class: "pose", text: pose.map(degrees).join(" ") })));
+    const dots = (points, kind) => {
+      const group = shape("g", { class: `dots-${kind}` });
+      for (let k = 0; k < points.length; k += 2) group.append(shape("circle", { cx: points[k], cy: points[k + 1], r: 7 }));
+      return group;
+    };
+    sheet.heads.forEach((head, h) => {
+      grid.append(make("span", { class: "name", text: head.subject }, make("small", { text: head.expression })));
+      sheet.tiles[h].forEach((tile, t) => {
+        const box = make("figure", { class: "tile" });
+        if (tile) {
+          const svg = shape("svg", { viewBox: "0 0 1000 1000", "aria-hidden": "true" });
+          svg.append(dots(tile.exact, "exact"), dots(tile.found, "found"));
+          box.append(make("img", { src: tile.src, alt: `${head.subject} at ${sheet.poses[t].map(degrees).join(", ")}` }), svg);
+          if (!tile.detected) box.append(make("figcaption", { class: "missed", text: "not detected" }));
+        }
+        grid.append(box);
+      });
+    });
+    for (const kind of ["exact", "found"]) {
+      $(`show-${kind}`).addEventListener("change", (e) => grid.classList.toggle(`hide-${kind}`, !e.target.checked));
+    }
+  }
+
+  // ---- the rest --------------------------------------------------------
+  function setUpHeads() {
+    const hidden = data.heads_count - data.publishable;
+    $("licence-note").textContent = hidden
+      ? `${whole(hidden)} of ${whole(data.heads_count)} heads may not be published: an export for publication refuses them.`
+      : "The images of all heads may be published under their licences.";
+    $("gallery").append(...data.heads.map((head) => {
+      const text = make("div", {}, make("b", { text: head.subject }),
+        make("p", { text: `${head.expression} · ${head.split} · ${head.source}` }),
+        make("p", {}, make("span", { class: `badge ${head.redistributable ? "yes" : "no"}`,
+          text: head.redistributable ? "✓ may be published" : "✕ not for publication" })),
+        make("p", { text: head.license }),
+        make("p", { text: `found in ${percent(head.rows ? head.detected / head.rows : 0)}` +
+          (head.distance_px === null ? "" : `, off by ${head.distance_px.toFixed(2)} px`) }));
+      const card = make("article", { class: "card head" },
+        head.src ? make("img", { src: head.src, alt: `${head.subject}, front`, loading: "lazy" }) : make("span", { class: "blank" }), text);
+      const more = [head.attribution, head.anchors ? `${head.anchors} landmarks anchored` +
+        (head.anchor_residual_mm === null ? "" : `, residual ${head.anchor_residual_mm.toFixed(2)} mm`) : "no anchors",
+        ...head.problems].filter(Boolean);
+      card.append(make("p", { class: "wide", text: more.join(" · ") }));
+      return card;
+    }));
+  }
+  function setUpBuild() {
+    const build = data.build;
+    $("command").textContent = build.command || "not recorded";
+    rows($("identity"), [["content digest", build.digest], ["configuration digest", build.configuration_digest],
+      ["schema", build.schema_version], ["units that failed", whole(build.failures)],
+      ["heads left out", build.skipped.length ? build.skipped.map((s) => Object.values(s).join(": ")).join("; ") : "none"]]);
+    rows($("configuration"), build.configuration);
+    rows($("versions"), Object.entries(build.versions));
+    if (!build.timings) { $("time-note").textContent = "No build.log lies beside this dataset, so times are not known."; return; }
+    $("time-note").textContent = "Seconds of all lanes together, a stage, of the units in build.log.";
+    rows($("timings"), Object.entries(build.timings).sort((a, b) => b[1] - a[1]).map(([k, v]) => [k, v.toFixed(1) + " s"]));
+  }
+  function setUpTop() {
+    const o = data.overall;
+    $("title").textContent = `${images(data.rows)} of ${whole(data.heads_count)} ${data.heads_count === 1 ? "head" : "heads"}`;
+    $("lead").textContent = "Rendered at poses that are known exactly. Where a detector found the face, its landmarks are " +
+      "compared with the same points on the mesh: what remains is the detector's own error.";
+    const figure = (name, value, under) => make("div", {}, make("dt", { text: name }),
+      make("dd", { text: value }, make("div", { class: "under", text: under })));
+    const figures = [
+      figure("Images", whole(data.rows), `${whole(data.poses)} poses a head`),
+      figure("Heads", whole(data.heads_count), `${whole(data.publishable)} may be published`),
+      figure("Faces found", percent(data.rows ? data.detected / data.rows : 0), `${whole(data.rows - data.detected)} missed`),
+    ];
+    if (o.compared) {
+      figures.push(figure("Landmarks off by", `${o.distance_px.toFixed(2)} px`, `${o.distance_mm.toFixed(2)} mm on the face`),
+        figure("Pose off by", `${o.geodesic_deg.toFixed(2)}°`, "rigid fit, mean angle"));
+    }
+    $("figures").append(...figures);
+  }
+
+  setUpTop();
+  setUpSheet();
+  setUpMaps();
+  if (!data.why_no_atlas) setUpFace();
+  setUpHeads();
+  setUpBuild();
+  document.documentElement.dataset.ready = "yes";
+})();

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render one sample of a finished dataset again, the way it was built, and compare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from generator.dataset.anchors_table import read_anchors
+from generator.dataset.files import file_sha256, write_bytes
+from generator.dataset.heads_table import HeadRow, read_heads
+from generator.dataset.manifest import Manifest, read_manifest
+from generator.dataset.open import as_array, image_bytes, read_samples
+from generator.dataset.part import read_part
+from generator.errors import DatasetError, HeadError, UsageError, WorkerError
+from generator.execution.folder import MADE_HEADS
+from generator.execution.lane import head_to_json
+from generator.execution.open_executor import open_executor
+from generator.execution.prepare import Prepared
+from generator.execution.scratch import scratch_folder
+from generator.heads.head import Head
+from generator.heads.source import find_heads
+from generator.landmarks.anchors import pack
+from generator.plan.config import PARAMETRIC, BuildConfig, load_config
+
+COMPARED = ("landmarks", "landmarks_exact")
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came out the second time.
+
+    same: image, passes, detection and landmarks are the recorded ones, bit by bit.
+    differences: a line each. versions: what ran then and now, where it is not the same.
+    """
+
+    sample_id: str
+    same: bool
+    differences: tuple[str, ...]
+    versions: tuple[str, ...]
+
+    def text(self) -> str:
+        """For people."""
+        if self.same:
+            return f"{self.sample_id}: the same image, landmarks and labels, bit by bit"
+        return "\n".join([f"{self.sample_id}: not the same", *self.differences, *self.versions])
+
+
+def replay_sample(
+    root: Path,
+    sample_id: str,
+    *,
+    heads: Path | None = None,
+    picture: Path | None = None,
+    blender: str | None = None,
+) -> Replay:
+    """Build one row again from the dataset's configuration and head files.
+
+    Parameters
+    ----------
+    heads: where the head source lies now, if it was moved.
+    picture: where the new image is written, if anywhere.
+
+    Raises
+    ------
+    UsageError: there is no such sample. HeadError: the head's files are gone or
+    were changed. DatasetError: the dataset cannot be read.
+    """
+    manifest = read_manifest(root)
+    recorded = read_samples(root, manifest, [sample_id]).get(sample_id)
+    if recorded is None:
+        example = next(iter(manifest.parts)).subject or "subject"
+        raise UsageError(
+            f"{root}: no sample {sample_id!r}; names are like {example}/neutral/y+30_p-10_r+0, "
+            "see the column sample_id"
+        )
+    config = load_config(None, manifest.configuration)
+    subject, expression = recorded["subject"], recorded["expression"]
+    row = next(h for h in read_heads(root) if (h.subject, h.expression) == (subject, expression))
+    head = _find(row, config, root, heads)
+    anchors = read_anchors(root)[subject, expression]
+    confidence = config.landmarks.min_confidence
+    with (
+        open_executor("local", workers=1, blender=blender, min_confidence=confidence) as lanes,
+        scratch_folder() as scratch,
+    ):
+        order = _order(row, head, anchors.points, config, recorded, scratch)
+        [outcome] = lanes.run([order], lambda: None)
+        if outcome.receipt is None:
+            raise WorkerError(f"{sample_id}: cannot be rendered again: {outcome.error}")
+        again = read_part(scratch / outcome.receipt["part"]["path"])
+        image = image_bytes(scratch, again.to_pylist()[0])
+        if picture is not None:
+            write_bytes(picture, image)
+        differences = [*_differences(recorded, again, image, root, manifest)]
+    versions = [
+        f"{name}: {manifest.versions.get(name, 'none')} then, {now} now"
+        for name, now in outcome.receipt["versions"].items()
+        if manifest.versions.get(name) != now
+    ]
+    return Replay(sample_id, not differences, tuple(differences), tuple(versions))
+
+
+def _find(row: HeadRow, config: BuildConfig, root: Path, moved: Path | None) -> Head:
+    """The head of a row, its files checked against the hashes of the build."""
+    wanted = config.heads
+    recorded = root / MADE_HEADS if wanted.source == PARAMETRIC else Path(wanted.source)
+    path = moved or recorded
+    again = "give the place it was moved to with --heads, or put it back"
+    if not path.exists():
+        raise HeadError(f"{path}: the heads of this dataset are not there any more; {again}")
+    base = path if path.is_dir() else path.parent
+    for name, sha256 in row.file_sha256:
+        if not (base / name).is_file():
+            raise HeadError(f"{base / name}: a file of {row.subject}/{row.expression} is gone; {again}")
+        if file_sha256(base / name) != sha256:
+            raise HeadError(
+                f"{base / name}: was changed after the build (SHA-256 differs); replay needs the "
+                "file as it was"
+            )
+    source = find_heads(
+        path,
+        expressions=wanted.expressions,
+        license=wanted.license,
+        redistributable=wanted.redistributable,
+        units=wanted.units,
+        up=wanted.up,
+        forward=wanted.forward,
+    )
+    for head in source.heads:
+        if (head.subject, head.expression) == (row.subject, row.expression):
+            return head
+    raise HeadError(f"{path}: no head {row.subject}/{row.expression} there any more; {again}")
+
+
+def _order(
+    row: HeadRow, head: Head, points: np.ndarray, config: BuildConfig, recorded: dict[str, Any], root: Path
+) -> dict[str, Any]:
+    """The build order of one pose, with what preparing the head found at the time."""
+    prepared = Prepared(
+        units=row.units,
+        mm_per_unit=row.mm_per_unit,
+        up=row.up,
+        forward=row.forward,
+        pivot=row.pivot,
+        radius_mm=row.radius_mm,
+        eye_distance_mm=float("nan"),
+        frame=row.frame,
+        correction=row.correction,
+        correction_sd_deg=row.correction_sd_deg,
+    )
+    return {
+        "op": "build",
+        "unit": "again",
+        "head": head_to_json(head),
+        "root": str(root),
+        "configuration_digest": "",
+        "poses": [[recorded[f"{angle}_deg"] for angle in ("yaw", "pitch", "roll")]],
+        "indices": [[recorded[f"{angle}_index"] for angle in ("yaw", "pitch", "roll")]],
+        "settings": config.render.settings().as_dict(),
+        "prepared": prepared.as_dict(),
+        "anchors": pack(points, "<f8"),
+        "distance_mm": row.distance_mm,
+        "split": row.split,
+        "images": "embedded",
+        "image_format": config.dataset.image_format,
+        "passes": list(config.dataset.passes),
+    }
+
+
+def _differences(
+    recorded: dict[str, Any], again: Any, image: bytes, root: Path, manifest: Manifest
+) -> list[str]:
+    now = again.to_pylist()[0]
+    found = []
+    if now["image_sha256"] != recorded["image_sha256"]:
+        how = ""
+        if manifest.images != "none":
+            then = _decode(image_bytes(root, recorded))
+            difference = np.abs(_decode(image).astype(int) - then.astype(int))
+            share = (difference.max(axis=2) > 0).mean()
+            how = f": up to {difference.max()} of 255 levels, on {share:.2%} of its pixels"
+        found.append(f"the image differs{how}")
+    if now["passes_sha256"] != recorded["passes_sha256"]:
+        found.append("the floats of the passes differ")
+    if now["detected"] != recorded["detected"]:
+        found.append(f"detected was {recorded['detected']}, is {now['detected']}")
+    for name in COMPARED:
+        then = np.array(recorded[name], dtype=np.float64)
+        new = as_array(again, name).astype(np.float64).reshape(-1)
+        if not np.array_equal(then, new, equal_nan=True):
+            off = np.abs(then - new)
+            unit = "px" if name == "landmarks" else "mm"
+            most = f": up to {np.nanmax(off):.3g} {unit}" if np.isfinite(off).any() else ""
+            found.append(f"{name} differ{most}")
+    if now["landmarks_visible"] != recorded["landmarks_visible"]:
+        changed = np.not_equal(now["landmarks_visible"], recorded["landmarks_visible"]).sum()
+        found.append(f"landmarks_visible differ: {changed} of them")
+    labels = ("rotation", "camera", "translation_mm", "projection", "width", "height")
+    found += [f"{name} differs" for name in labels if now[name] != recorded[name]]
+    return found
+
+
+def _decode(image: bytes) -> np.ndarray:
+    pixels = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise DatasetError("an image of the dataset cannot be decoded; see `headturn verify`")
+    return pixels

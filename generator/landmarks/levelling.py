@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a head's canonical pose zero is, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.geometry.rigid import fit_similarity
+from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, angles_from_rotation, graphics_rotation
+from generator.landmarks.reference_face import surface_face
+
+FEWEST_POINTS = 200
+"""Fewer anchors than this are no face to level."""
+
+SHAPE_SD_DEG = (0.3, 3.2, 0.1)
+"""Standard deviation of yaw, pitch and roll of this fit over the 24 heads of
+scripts/make_reference_face.py, whose axes agree by construction: a face is not shaped like the
+mean face, and above all its profile leaves open where its pitch is zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Levelling:
+    """The rotation from a mesh's own axes to the canonical pose zero.
+
+    correction: R_U, float64 [3, 3]. sd_deg: float64 [3], standard deviation about the axes of
+    yaw, pitch and roll: of the mean over views, and of the shape of faces.
+    """
+
+    correction: np.ndarray
+    sd_deg: np.ndarray
+
+
+def level(points: np.ndarray, views: np.ndarray) -> Levelling | None:
+    """Rigid alignment of a neutral head's anchors to the reference face; None with too few of them.
+
+    Parameters
+    ----------
+    points: float [468, 3], anchors, frame C, NaN where absent.
+    views: float [V, 468, 3], the same from each view alone.
+    """
+    rotation = _rotation(points)
+    if rotation is None:
+        return None
+    single = [angles_from_rotation(r) for view in views if (r := _rotation(view)) is not None]
+    noise = np.var(single, axis=0, ddof=1) / len(single) if len(single) > 1 else np.zeros(3)
+    return Levelling(graphics_rotation(rotation.T), np.sqrt(noise + np.square(SHAPE_SD_DEG)))
+
+
+def _rotation(points: np.ndarray) -> np.ndarray | None:
+    known = np.isfinite(points).all(axis=1)
+    if known.sum() < FEWEST_POINTS:
+        return None
+    return fit_similarity((surface_face() @ CAMERA_FROM_GRAPHICS)[known], points[known]).rotation

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes the Blender extension: blender_addon/ and the parts of generator/ it uses, in one zip.
+
+    python scripts/build_extension.py [--out dist]
+
+Needs no Blender and nothing but the standard library. The generator's modules go
+in as a private package of the extension, with their imports made relative, so
+that one code base serves both and nothing is added to Blender's module path.
+The same sources give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+ADDON = ROOT / "blender_addon"
+_IMPORT = re.compile(r"^(\s*)from generator(\.[\w.]+)? import ", re.MULTILINE)
+_DATE = (2020, 1, 1, 0, 0, 0)
+_SKIPPED = ("README.md",)
+
+
+def generator_version() -> str:
+    """The version of the checkout."""
+    text = (ROOT / "generator" / "__init__.py").read_text(encoding="utf-8")
+    found = re.search(r'^__version__ = "([^"]+)"', text, re.MULTILINE)
+    if found is None:
+        sys.exit("build_extension.py: generator/__init__.py names no __version__")
+    return found[1]
+
+
+def extension_files() -> dict[str, bytes]:
+    """Path in the zip -> content."""
+    sources = {p.relative_to(ADDON).as_posix(): p for p in sorted(ADDON.rglob("*.py"))}
+    todo = [module for path in sources.values() for module in _generator_modules(path)]
+    while todo:
+        module = todo.pop()
+        base = ROOT / module.replace(".", "/")
+        path = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
+        name = path.relative_to(ROOT).as_posix()
+        if name not in sources:
+            sources[name] = path
+            todo += _generator_modules(path)
+    files = {name: _relative(name, path).encode() for name, path in sources.items()}
+    for path in sorted(p for p in ADDON.iterdir() if p.suffix in (".toml", ".md") and p.name not in _SKIPPED):
+        files[path.name] = path.read_bytes()
+    manifest = files["blender_manifest.toml"].decode()
+    files["blender_manifest.toml"] = re.sub(
+        r"^version = .*$", f'version = "{generator_version()}"', manifest, flags=re.MULTILINE
+    ).encode()
+    files["LICENSE.txt"] = (ROOT / "LICENSES" / "GPL-3.0-or-later.txt").read_bytes()
+    return dict(sorted(files.items()))
+
+
+def write_extension(folder: Path) -> Path:
+    """Write headturn-<version>.zip into folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / f"headturn-{generator_version()}.zip"
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in extension_files().items():
+            archive.writestr(zipfile.ZipInfo(name, _DATE), content, zipfile.ZIP_DEFLATED)
+    return target
+
+
+def _generator_modules(path: Path) -> list[str]:
+    """Modules of the generator that a file imports, with the packages they lie in."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if (
+            isinstance(node, ast.ImportFrom)
+            and node.level == 0
+            and (node.module or "").startswith("generator")
+        ):
+            names += [node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)]
+    found = []
+    for name in names:
+        base = ROOT / name.replace(".", "/")
+        if base.is_dir() or base.with_suffix(".py").is_file():
+            parts = name.split(".")
+            found += [".".join(parts[: k + 1]) for k in range(len(parts))]
+    return found
+
+
+def _relative(name: str, path: Path) -> str:
+    dots = "." * len(Path(name).parts)
+    return _IMPORT.sub(rf"\1from {dots}generator\2 import ", path.read_text(encoding="utf-8"))
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Write the Blender extension.")
+    parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder of the zip")
+    print(write_extension(parser.parse_args().out))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A real Blender: the extension is valid, installs, and builds the same bytes as the command line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from real_blender import ROOT, RealBlender
+
+from generator.dataset.manifest import read_manifest
+
+MODULE = "bl_ext.user_default.headturn"
+
+
+@pytest.fixture(scope="session")
+def small_build(parametric_heads: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A configuration of three poses and the dataset that `headturn build` makes of it."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "small.toml").write_text(
+        f'[heads]\nsource = "{parametric_heads}"\nsubjects = ["s1p0000"]\n'
+        "[poses]\nyaw = [-30, 30, 30]\npitch = [0, 0, 10]\nroll = [0, 0, 10]\n[render]\nresolution = 96\n",
+        encoding="utf-8",
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "generator.cli",
+        "build",
+        "small.toml",
+        "--out",
+        "host",
+        "--workers",
+        "1",
+    ]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    return folder
+
+
+def same_content(a: Path, b: Path) -> bool:
+    one, other = read_manifest(a), read_manifest(b)
+    parts = [[(part.path, part.sha256) for part in manifest.parts] for manifest in (one, other)]
+    return one.digest == other.digest and parts[0] == parts[1]
+
+
+def test_the_extension_is_valid_and_enabled(real_blender: RealBlender, extension_zip: Path) -> None:
+    said = real_blender.run("--command", "extension", "validate", str(extension_zip))
+    assert "Success" in said.stdout + said.stderr
+    code = (
+        "import bpy, sys, addon_utils\n"
+        f"name = '{MODULE}'\n"
+        "assert name in bpy.context.preferences.addons\n"
+        "assert not any('numpy' in m for m in sys.modules if m.startswith(name))\n"
+        f"assert '{MODULE}.studio' not in sys.modules, 'start-up must stay light'\n"
+        "for _ in range(2):\n"
+        "    addon_utils.disable(name)\n"
+        "    assert not hasattr(bpy.types.Scene, 'headturn')\n"
+        "    addon_utils.enable(name)\n"
+        "assert bpy.context.scene.headturn.yaw == 0\n"
+    )
+    said = real_blender.run("--background", "--python-exit-code", "4", "--python-expr", code)
+    assert "Error" not in said.stdout + said.stderr and "Traceback" not in said.stdout + said.stderr
+
+
+def test_the_command_builds_what_the_host_builds(real_blender: RealBlender, small_build: Path) -> None:
+    config, out = str(small_build / "small.toml"), str(small_build / "command")
+    arguments = ("--background", "--command", "headturn")
+    said = real_blender.run(*arguments, "build", config, "--out", out, "--workers", "1")
+    assert "rendering 0 of 3" in said.stdout and "3 images" in said.stdout
+    assert same_content(Path(out), small_build / "host")
+    real_blender.run(*arguments, "verify", out)
+    assert real_blender.run(*arguments, "verify", str(small_build), check=False).returncode == 1
+    wrong = real_blender.run(*arguments, "build", "nowhere.toml", check=False)
+    assert wrong.returncode == 2 and "nowhere.toml" in wrong.stderr
+    lost = real_blender.run(*arguments, "build", config, check=False, HEADTURN_PYTHON="/nowhere")
+    assert lost.returncode == 2 and "HEADTURN_PYTHON" in lost.stderr
+
+
+def test_without_the_extension_a_script_does_the_same(real_blender: RealBlender, small_build: Path) -> None:
+    script, out = str(ROOT / "blender_addon" / "headless.py"), str(small_build / "script")
+    flags = ("--background", "--factory-startup", "--python-exit-code", "1", "--python", script, "--")
+    real_blender.run(*flags, "build", str(small_build / "small.toml"), "--out", out, "--workers", "1")
+    assert same_content(Path(out), small_build / "host")
+    assert real_blender.run(*flags, "verify", "/nowhere", check=False).returncode == 1
+
+
+def test_another_blender_renders_and_the_labels_stay(blender_command: Path, small_build: Path) -> None:
+    out = small_build / "other"
+    command = [sys.executable, "-m", "generator.cli", "build", "small.toml", "--out", str(out)]
+    command += ["--workers", "1", "--blender", str(blender_command)]
+    subprocess.run(command, cwd=small_build, check=True, capture_output=True)
+    ours, theirs = (pq.read_table(folder / "data").to_pylist() for folder in (small_build / "host", out))
+    rendered = {"landmarks", "detected", "image_sha256"}
+    for a, b in zip(ours, theirs, strict=True):
+        assert {name for name in a if a[name] != b[name]} <= rendered
+    assert read_manifest(out).versions["blender"] != read_manifest(small_build / "host").versions["blender"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"), [("Blender 4.1.1", "too old"), ("gimp 2.10", "does not answer --version")]
+)
+def test_what_cannot_render_is_refused(tmp_path: Path, answer: str, expected: str) -> None:
+    fake = tmp_path / "blender"
+    fake.write_text(f"#!/bin/sh\necho '{answer}'\n")
+    fake.chmod(0o755)
+    command = [sys.executable, "-m", "generator.cli", "build", "--out", str(tmp_path / "d")]
+    done = subprocess.run([*command, "--blender", str(fake)], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and expected in done.stderr
+
+
+def test_a_studio_s_colour_management_changes_no_pixel(small_build: Path) -> None:
+    """OCIO names one for all programs; Blender 5 names its own to every process it starts."""
+    command = [
+        sys.executable,
+        "-m",
+        "generator.cli",
+        "build",
+        "small.toml",
+        "--out",
+        "ocio",
+        "--workers",
+        "1",
+    ]
+    environment = {**os.environ, "OCIO": str(small_build / "nowhere.ocio")}
+    subprocess.run(command, cwd=small_build, check=True, capture_output=True, env=environment)
+    assert same_content(small_build / "ocio", small_build / "host")

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs with the bpy wheel: the installed extension without a window. argv: extension zip, head package."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+NAME = "bl_ext.user_default.headturn"
+R_B = """0.556670399 0.766044443 0.321393805 -0.829598373 0.492403877 0.263258355
+0.043412044 -0.413175911 0.909615886"""
+
+
+def main(package: str, head: str) -> None:
+    addon_utils = importlib.import_module("addon_utils")  # there once bpy is
+    bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
+    for _ in range(2):
+        addon_utils.disable(NAME)
+        assert not hasattr(bpy.types.Scene, "headturn")
+        addon_utils.enable(NAME)
+    studio = importlib.import_module(f"{NAME}.studio")
+    settings = importlib.import_module(f"{NAME}.settings")
+    own = bpy.context.scene
+    before = {name: len(getattr(bpy.data, name)) for name in ("meshes", "materials", "worlds", "cameras")}
+    scene = studio.studio_scene()
+    studio.show_package(scene, Path(head), 120.0)
+    assert scene != own and scene.headturn.head is not None and own.headturn.head is None
+
+    shown = scene.headturn
+    made = shown.head.data.as_pointer(), [m.as_pointer() for m in shown.head.data.materials]
+    shown.yaw, shown.pitch, shown.roll = 50, 40, 30
+    matrix = np.array(shown.head.matrix_world)[:3, :3]
+    assert np.abs(matrix - np.array(R_B.split(), dtype=float).reshape(3, 3)).max() < 1e-6, matrix
+    assert made == (shown.head.data.as_pointer(), [m.as_pointer() for m in shown.head.data.materials])
+
+    shown.on_timeline = True
+    scene.frame_set(347)
+    assert (shown.yaw, shown.pitch, shown.roll, scene.frame_end) == (0, 0, 0, 693)
+    shown.yaw = 12.0
+    shown.snap = True
+    assert shown.yaw == 10.0
+
+    # The camera is the build's; a new look leaves no old data behind.
+    for preset in ("quality", "fast", "quality"):
+        shown.preset = preset
+    shown.lens_mm, shown.resolution = 50, 512
+    assert scene.camera.data.lens == 50 and scene.render.resolution_x == 512
+    after = {name: len(getattr(bpy.data, name)) for name in before}
+    added = {"meshes": 1, "materials": len(shown.head.data.materials), "worlds": 1, "cameras": 1}
+    assert after == {name: before[name] + added[name] for name in before}, (before, after)
+    assert studio.distance_mm(shown) == round(1.05 * 120 / np.sin(np.arctan(18 / 50)), 2)
+
+    # A configuration that does not fit changes nothing.
+    bad = Path(head).with_name("bad.toml")
+    bad.write_text('[render]\nresolution = "large"\n', encoding="utf-8")
+    config = settings.to_config(shown)
+    try:
+        settings.load(shown, bad)
+    except Exception as error:
+        assert "bad.toml" in str(error), error
+    else:
+        raise AssertionError("a resolution that is no number was taken")
+    assert settings.to_config(shown) == config
+    print("passed", bpy.app.version_string)
+
+
+main(*sys.argv[1:])
