@@ -95,7 +95,9 @@ def fill_scene(
     """
     head = _build_head(mesh, settings)
     scene.collection.objects.link(head)
-    scene.collection.objects.link(_unseen_twin(head))
+    if settings.preset == "fast":
+        # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
+        scene.collection.objects.link(_unseen_twin(head))
     build_light(scene, settings, srgb_to_linear(settings.background))
     _build_camera(scene, settings, distance_mm)
     _set_render(scene, settings, threads)
