@@ -28,8 +28,10 @@ demo: $(VENV)/.build
 	@echo "== look at $(DEMO)/contact_sheet.png, $(DEMO)/detection_rate.png and, in a browser, $(DEMO)/report.html"
 
 test: $(VENV)/.dev
+	@echo "== checking style and types"
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	@echo "== running every test (about a quarter of an hour on two cores)"
 	$(BIN)/pytest -q
 
 lint: $(VENV)/.dev
@@ -66,7 +68,7 @@ $(VENV)/.build: pyproject.toml scripts/system_libraries.sh | $(VENV)/bin/python
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.build scripts/test_browser.sh
-	@echo "== installing the test tools"
+	@echo "== installing the test tools, torch and Ray (a few minutes)"
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[build,hpe,cluster,dev]'
 	sh scripts/test_browser.sh
 	touch $@

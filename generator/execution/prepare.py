@@ -36,7 +36,7 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PIVOT_DEPTH = 1.00
 """Depth of the ear axis behind the outer eye corners, in outer-eye distances.
 
-About 90 mm for eyes 90 mm apart; see docs/heads.md for how it was measured.
+About 90 mm for eyes 90 mm apart; a convention, see docs/heads.md.
 """
 
 REACH = 2.0
