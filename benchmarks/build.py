@@ -17,17 +17,17 @@ import os
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
 import psutil
+from resident import Resident
 
 from generator.execution.build import build
-from generator.execution.executor import available_cores
 from generator.execution.open_executor import open_executor
 from generator.heads.parametric.make import make_heads
 from generator.plan.config import load_config
+from generator.process import available_cores
 
 NAIVE = Path(__file__).with_name("naive_script.py")
 
@@ -62,38 +62,6 @@ class Clock:
         return self.frames / (self.ended - self.began)
 
 
-class Memory(threading.Thread):
-    """Samples the resident memory of this process's children."""
-
-    def __init__(self) -> None:
-        super().__init__(daemon=True)
-        self.samples: dict[tuple[int, str], list[int]] = {}
-        self._stop_now = threading.Event()
-
-    def run(self) -> None:
-        """Sample four times a second."""
-        while not self._stop_now.wait(0.25):
-            for child in psutil.Process().children(recursive=True):
-                try:
-                    words = child.cmdline()
-                    kind = next((w for w in words if w.startswith("generator.")), Path(words[0]).name)
-                    self.samples.setdefault((child.pid, kind), []).append(child.memory_info().rss)
-                except (psutil.NoSuchProcess, psutil.ZombieProcess, IndexError):
-                    continue  # it ended between being listed and being asked
-
-    def stop(self) -> None:
-        """Stop and print peak, and growth over the second half of each process's life."""
-        self._stop_now.set()
-        self.join()
-        for (_, kind), values in sorted(self.samples.items(), key=lambda item: item[0][1]):
-            if len(values) < 8:
-                continue
-            half = len(values) // 2
-            growth = (values[-1] - values[half]) / 2**20
-            peak = max(values) / 2**20
-            print(f"  {kind:32} peak {peak:5.0f} MiB, growth over the second half {growth:+.1f} MiB")
-
-
 def timed_build(
     heads: Path, preset: str, executor: str, frames: int, folder: Path, *, memory: bool = False
 ) -> float:
@@ -107,13 +75,14 @@ def timed_build(
             "render": {"preset": preset, "resolution": 256},
         },
     )
-    clock, sampler = Clock(), Memory()
+    clock, sampler = Clock(), Resident()
     if memory:
         sampler.start()
     with open_executor(executor) as lanes:
         result = build(config, folder, lanes, clock)
     if memory:
         sampler.stop()
+        print(sampler.text())
     total = sum(result.seconds.values())
     shares = ", ".join(f"{k} {v / total:.0%}" for k, v in sorted(result.seconds.items(), key=lambda i: -i[1]))
     found = result.manifest.detected_rows / result.manifest.rows

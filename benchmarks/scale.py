@@ -160,8 +160,11 @@ def main() -> None:
             build(config, root, executor, quiet)
         planned = quiet.began["rendering"] - quiet.began["preparing heads"]
         print(f"{'  of that heads, plan and scan':52} {planned:8.2f} s")
+        with measured("verify --quick"):
+            report = verify_dataset(root, quick=True)
+        assert report.ok, report.text()
         if not arguments.no_verify:
-            with measured("verify"):
+            with measured("verify, every byte"):
                 report = verify_dataset(root)
             assert report.ok, report.text()
     finally:

@@ -22,6 +22,7 @@ from generator.console import JsonFlag, err, out
 from generator.errors import HeadturnError, UsageError
 from generator.execution.stopping import Stopped
 from generator.option_values import given, numbers, pose_source
+from generator.reporter import TerminalReporter
 
 app = typer.Typer(
     help="3D heads in, Parquet with exact head pose out.",
@@ -209,12 +210,25 @@ def build(
 @app.command(epilog="Example: headturn verify dataset")
 def verify(
     folder: Annotated[Path, typer.Argument(help="A dataset made by headturn build.")],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Sizes, footers and row counts only; contents are not read.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; default one a core where it pays.")
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Prove that every row of the plan is there once, labels agree and hashes match."""
     from generator.dataset.verify import verify_dataset
 
-    report = verify_dataset(folder)
+    with TerminalReporter(err) as reporter:
+
+        def step(done: int, total: int) -> None:
+            if done == 1 and err.is_terminal:
+                reporter.stage("verifying", total)
+            reporter.advance()
+
+        report = verify_dataset(folder, quick=quick, workers=workers, progress=step)
     typer.echo(json.dumps(report.as_dict(), indent=1) if as_json else report.text())
     if not report.ok:
         raise typer.Exit(1)

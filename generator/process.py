@@ -40,3 +40,10 @@ def is_running(pid: int) -> bool:
     except PermissionError:
         return True
     return True
+
+
+def available_cores() -> list[int]:
+    """The cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))

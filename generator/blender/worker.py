@@ -49,12 +49,16 @@ def _import_package_beside_this_file() -> None:
 if "generator" not in sys.modules and not __package__:
     _import_package_beside_this_file()
 
+from generator.process import end_with_parent  # noqa: E402
+
+if __name__ == "__main__":
+    end_with_parent()  # before bpy, which takes a second to load: its host may die in it
+
 import bpy  # noqa: E402
 
 from generator.blender import compat, scene  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
 from generator.plan.render_settings import RenderSettings  # noqa: E402
-from generator.process import end_with_parent  # noqa: E402
 
 
 class RenderWorker:
@@ -97,7 +101,6 @@ class RenderWorker:
 
 def main(threads: int) -> None:
     """Serve orders from stdin until it closes."""
-    end_with_parent()
     # Receipts get stdout to themselves. What Blender prints there, 5 kB a frame, would fill the log.
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

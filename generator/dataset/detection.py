@@ -13,7 +13,7 @@ import pyarrow as pa
 from generator.dataset.heads_table import HeadRow, read_heads
 from generator.dataset.manifest import POSES_FILE, Manifest
 from generator.dataset.open import as_array, read_rows
-from generator.plan.poses import PosePlan, csv_plan
+from generator.plan.poses import ANGLES, PosePlan, csv_plan
 
 BIN_DEG = 10
 MAX_CELLS = 30
@@ -35,6 +35,49 @@ class Cell:
         return self.detected / self.rows
 
 
+class Places:
+    """Finds rows in heads.parquet and poses.csv, many at a time: there may be millions of rows."""
+
+    def __init__(self, heads: Sequence[HeadRow], plan: PosePlan) -> None:
+        self._head_index = {(head.subject, head.expression): i for i, head in enumerate(heads)}
+        # A pose is found by its place on each axis, so that only whole numbers are compared.
+        self._axes = [np.unique(axis) for axis in plan.angles_deg.T]
+        keys = self._keys(plan.angles_deg)
+        self._order = np.argsort(keys)
+        self._sorted = keys[self._order]
+
+    def of(self, table: pa.Table | pa.RecordBatch) -> tuple[np.ndarray, np.ndarray]:
+        """int32 [N]: the head and the pose of each row, -1 where unknown."""
+        subjects, expressions = (table.column(name).dictionary_encode() for name in ("subject", "expression"))
+        if isinstance(subjects, pa.ChunkedArray):
+            subjects, expressions = subjects.combine_chunks(), expressions.combine_chunks()
+        index = np.array(
+            [
+                [
+                    self._head_index.get((subject, expression), -1)
+                    for expression in expressions.dictionary.to_pylist()
+                ]
+                for subject in subjects.dictionary.to_pylist()
+            ],
+            np.int32,
+        ).reshape(len(subjects.dictionary), len(expressions.dictionary))
+        heads = index[subjects.indices.to_numpy(), expressions.indices.to_numpy()]
+        keys = self._keys(np.stack([as_array(table, f"{name}_deg") for name in ANGLES], axis=-1))
+        at = np.minimum(np.searchsorted(self._sorted, keys), len(self._sorted) - 1)
+        poses = np.where(self._sorted[at] == keys, self._order[at], -1).astype(np.int32)
+        return heads, poses
+
+    def _keys(self, angles: np.ndarray) -> np.ndarray:
+        """int64 [N], one number a pose, -1 where an angle is not one of the plan's."""
+        keys = np.zeros(len(angles), np.int64)
+        known = np.ones(len(angles), bool)
+        for values, angle in zip(self._axes, angles.T, strict=True):
+            at = np.minimum(np.searchsorted(values, angle), len(values) - 1)
+            known &= values[at] == angle
+            keys = keys * len(values) + at
+        return np.where(known, keys, -1)
+
+
 class DetectionTally:
     """How often each (head, pose) was seen and whether its face was found.
 
@@ -46,22 +89,11 @@ class DetectionTally:
         self.heads, self.plan = heads, plan
         self.rows = np.zeros((len(heads), len(plan)), np.uint8)
         self.detected = np.zeros((len(heads), len(plan)), np.uint8)
-        self._head_index = {(head.subject, head.expression): i for i, head in enumerate(heads)}
-        self._pose_index = {tuple(pose): i for i, pose in enumerate(plan.angles_deg.tolist())}
 
-    def add(self, table: pa.Table | pa.RecordBatch) -> tuple[np.ndarray, np.ndarray]:
-        """Count rows; returns the places int64 [N] of their heads and poses, -1 where unknown."""
-        names = zip(*(table.column(name).to_pylist() for name in ("subject", "expression")), strict=True)
-        angles = zip(
-            *(as_array(table, f"{name}_deg").tolist() for name in ("yaw", "pitch", "roll")), strict=True
-        )
-        heads = np.array([self._head_index.get(name, -1) for name in names], np.int64)
-        poses = np.array([self._pose_index.get(angle, -1) for angle in angles], np.int64)
-        known = (heads >= 0) & (poses >= 0)
-        place = (heads[known], poses[known])
-        np.add.at(self.rows, place, 1)
-        np.add.at(self.detected, place, as_array(table, "detected")[known].astype(np.uint8))
-        return heads, poses
+    def add(self, heads: np.ndarray, poses: np.ndarray, detected: np.ndarray) -> None:
+        """Count rows by their places, int [N], none below 0; detected: bool [N]."""
+        np.add.at(self.rows, (heads, poses), 1)
+        np.add.at(self.detected, (heads, poses), detected.astype(np.uint8))
 
     @property
     def rate(self) -> float:
@@ -93,10 +125,13 @@ class DetectionTally:
 
 def tally_detection(root: Path, manifest: Manifest) -> DetectionTally:
     """Count a finished dataset. Raises DatasetError or UsageError if one of its files cannot be read."""
-    tally = DetectionTally(read_heads(root), csv_plan(root / POSES_FILE))
-    columns = ["subject", "expression", "yaw_deg", "pitch_deg", "roll_deg", "detected"]
+    heads, plan = read_heads(root), csv_plan(root / POSES_FILE)
+    tally, places = DetectionTally(heads, plan), Places(heads, plan)
+    columns = ["subject", "expression", *(f"{name}_deg" for name in ANGLES), "detected"]
     for batch in read_rows(root, manifest.parts, columns):
-        tally.add(batch)
+        head, pose = places.of(batch)
+        known = (head >= 0) & (pose >= 0)
+        tally.add(head[known], pose[known], as_array(batch, "detected")[known])
     return tally
 
 

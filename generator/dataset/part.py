@@ -227,13 +227,13 @@ def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
 
     Raises DatasetError: the file is missing, cut short or damaged.
     """
-    with _reading(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
+    with reading(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
         yield from file.iter_batches(batch_size=BATCH)
 
 
 def part_schema_of(path: Path) -> pa.Schema:
     """Schema of one part with its metadata. Raises DatasetError as :func:`iter_part` does."""
-    with _reading(path):
+    with reading(path):
         return pq.read_schema(path)
 
 
@@ -252,7 +252,7 @@ def check_part(path: Path) -> PartInfo:
     rows, detected, digests = 0, 0, [NO_ROWS]
     heads: set[tuple[str, str]] = set()
     for batch in iter_part(path):
-        with _reading(path):
+        with reading(path):
             digests.append(content_digest(batch))
             detected += pc.sum(batch.column("detected")).as_py()
             heads.update(zip(*(batch.column(n).to_pylist() for n in ("subject", "expression")), strict=True))
@@ -271,7 +271,8 @@ def check_part(path: Path) -> PartInfo:
 
 
 @contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def reading(path: Path) -> Iterator[None]:
+    """A block that reads a part; whatever it cannot read becomes a DatasetError that names the file."""
     try:
         yield
     except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 from generator.execution.lane import OnFrame
 from generator.execution.slot import Outcome
+from generator.process import available_cores
 
 
 class Executor(Protocol):
@@ -24,13 +24,6 @@ class Executor(Protocol):
     def close(self) -> None:
         """End every process that was started."""
         ...
-
-
-def available_cores() -> list[int]:
-    """The cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return sorted(os.sched_getaffinity(0))
-    return list(range(os.cpu_count() or 1))
 
 
 def share_cores(workers: int) -> list[tuple[int, ...]]:

@@ -2,16 +2,14 @@
 """A lane: one render worker and one detector that turn orders into committed parts.
 
 The same class serves every executor: in-process (serial), as a child process
-(``python -m generator.execution.lane``, local), or in a Ray actor. Orders and
+(``python -m generator.execution.lane_main``, local), or in a Ray actor. Orders and
 receipts are plain JSON values; images never leave the lane.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,7 +26,7 @@ from generator import __version__
 from generator.dataset.part import UnitRows, commit_unit
 from generator.dataset.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.schema import part_schema
-from generator.errors import HeadError, HeadturnError, WorkerError
+from generator.errors import HeadError, WorkerError
 from generator.execution.anchoring import anchor_head, level_head
 from generator.execution.prepare import Prepared, prepare
 from generator.execution.renderer import DEADLINE_S, Renderer
@@ -44,7 +42,7 @@ from generator.landmarks.levelling import Levelling
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.landmarks.surface import Surface
 from generator.plan.render_settings import RenderSettings
-from generator.process import end_with_parent, resident_mib
+from generator.process import resident_mib
 
 OnFrame = Callable[[], None]
 
@@ -300,36 +298,3 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
     seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
-
-
-def main() -> None:
-    """Serve orders from stdin; the first line holds the options."""
-    end_with_parent()
-    receipts = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # whatever a library prints goes to the log
-
-    def answer(receipt: dict[str, Any]) -> None:
-        receipts.write(json.dumps(receipt) + "\n")
-
-    answer({"ready": os.getpid()})
-    options = json.loads(sys.stdin.readline())
-    if options["cpus"] and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, options["cpus"])  # inherited by the render worker
-    cv2.setNumThreads(1)
-    lane: Lane | None = None
-    try:
-        for line in sys.stdin:
-            try:
-                if lane is None:
-                    lane = Lane(LaneOptions(**{**options, "cpus": tuple(options["cpus"])}))
-                answer({"receipt": lane.run(json.loads(line), lambda: answer({"frame": 1}))})
-            except HeadturnError as error:
-                log = getattr(error, "log", "")
-                answer({"error": str(error), "type": type(error).__name__, "log": log})
-    finally:
-        if lane is not None:
-            lane.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -18,12 +18,12 @@ PATIENCE = 1.5
 
 
 class LaneProcess:
-    """Starts ``python -m generator.execution.lane`` and speaks with it."""
+    """Starts ``python -m generator.execution.lane_main`` and speaks with it."""
 
     def __init__(self, options: LaneOptions) -> None:
         log = Path(options.scratch) / "lane.log"
         self._deadline_s = options.deadline_s * PATIENCE
-        self._process = LineProcess([sys.executable, "-m", "generator.execution.lane"], log)
+        self._process = LineProcess([sys.executable, "-m", "generator.execution.lane_main"], log)
         self._process.send(asdict(options))
         self._ready = False
 

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from generator.errors import UsageError
-from generator.execution.executor import Executor, available_cores
+from generator.execution.executor import Executor
 from generator.execution.lane import LaneOptions
 from generator.execution.local import LocalExecutor
 from generator.execution.renderer import DEADLINE_S, check_blender, worker_command
 from generator.execution.scratch import scratch_folder
 from generator.execution.serial import SerialExecutor
-from generator.process import MIB
+from generator.process import MIB, available_cores
 
 EXECUTORS = ("serial", "local", "ray")
 MEMORY_SHARE = 0.8

@@ -14,11 +14,11 @@ from dataclasses import asdict
 from typing import Any
 
 from generator.errors import DatasetError, UsageError
-from generator.execution.executor import available_cores
 from generator.execution.lane import Lane, LaneOptions, OnFrame
 from generator.execution.order_queue import OrderQueue
 from generator.execution.scratch import remove_leftovers, scratch_folder
 from generator.execution.slot import ATTEMPTS, LaneSlot, Outcome
+from generator.process import available_cores
 
 IN_FLIGHT = 2
 """Orders an actor has at a time: one to work on, one that waits at its door."""

@@ -56,6 +56,38 @@ def test_a_good_dataset(build, tmp_path, images):
     assert "yaw +30, pitch +20: 0% of 4" in report.text()
 
 
+def test_several_processes_find_the_same(build, tmp_path):
+    root = tmp_path / "d"
+    build(root, "files")
+    assert verify_dataset(root, workers=2).as_dict() == verify_dataset(root, workers=1).as_dict()
+    rewrite(root, {"yaw_deg": [1.0] * 10}, honest=True)
+    (image,) = list((root / "images/s2").rglob("*.png"))[:1]
+    image.write_bytes(b"")
+    alone, together = verify_dataset(root, workers=1), verify_dataset(root, workers=2)
+    assert not alone.ok
+    assert together.as_dict() == alone.as_dict()
+
+
+def test_quick_reads_no_rows_and_says_so(build, tmp_path):
+    root = tmp_path / "d"
+    build(root, "files")
+    report = verify_dataset(root, quick=True)
+    assert report.ok, report.text()
+    assert (report.rows, report.heads * report.poses, report.detected_rows) == (36, 36, 32)
+    assert "without --quick every byte is read" in report.text()
+    assert "closure" not in report.text()
+    with (root / PART).open("r+b") as file:  # the same size, other bytes: only reading finds it
+        file.seek(100)
+        file.write(b"\xff" * 8)
+    assert verify_dataset(root, quick=True).ok
+    assert not verify_dataset(root).ok
+    with (root / PART).open("ab") as file:
+        file.write(b"more")
+    assert set(failures(verify_dataset(root, quick=True))) == {"part sizes"}
+    (root / PART).unlink()
+    assert set(failures(verify_dataset(root, quick=True))) == {"part files", "rows"}
+
+
 def test_poses_off_the_grid(build, tmp_path):
     build(tmp_path / "d", "none", plan=sobol_plan(40, 1))
     report = verify_dataset(tmp_path / "d")

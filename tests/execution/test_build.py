@@ -33,9 +33,13 @@ def test_a_build_verifies_and_shows_itself(built: tuple[BuildConfig, Path]) -> N
     assert len(list((root / "images").rglob("*.png"))) == 12
 
 
-def test_serial_and_local_give_the_same_bytes(built: tuple[BuildConfig, Path], tmp_path: Path) -> None:
+@pytest.mark.parametrize(("executor", "lanes"), [("serial", {}), ("local", {"workers": 1})])
+def test_any_executor_gives_the_same_bytes(
+    executor: str, lanes: dict, built: tuple[BuildConfig, Path], tmp_path: Path
+) -> None:
+    """The one compared with has as many lanes as there are cores."""
     config, root = built
-    result = run(config, tmp_path / "serial", "serial")
+    result = run(config, tmp_path / "dataset", executor, lanes=lanes)
     ours = read_manifest(root)
     assert result.manifest.digest == ours.digest
     assert [p.sha256 for p in result.manifest.parts] == [p.sha256 for p in ours.parts]

@@ -165,7 +165,7 @@ def test_a_lane_that_hangs_is_replaced(built: Built, tmp_path: Path) -> None:
     with host(built[0], looked_at(built, tmp_path / "d"), "--workers", "1", "--deadline", "8") as started:
         while not any("execution.lane" in " ".join(p.cmdline()) for p in started.workers()):
             time.sleep(0.05)
-        [lane] = [p for p in started.workers() if "generator.execution.lane" in p.cmdline()]
+        [lane] = [p for p in started.workers() if "generator.execution.lane_main" in p.cmdline()]
         lane.suspend()
         assert started.wait() == 0, started.text()
         assert not started.orphans()
