@@ -3,12 +3,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from small_builds import config_for, run
+from small_builds import close_lanes, config_for, run
 
 from generator.plan.config import BuildConfig
+
+
+@pytest.fixture(scope="session", autouse=True)
+def lanes() -> Iterator[None]:
+    """Those that builds of the tests share end with the last test."""
+    yield
+    close_lanes()
 
 
 @pytest.fixture(scope="session")

@@ -10,13 +10,15 @@ import tempfile
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import psutil
 
 from generator.execution.build import BuildResult, build
+from generator.execution.executor import Executor
 from generator.execution.open_executor import open_executor
 from generator.execution.scratch import remove_leftovers
 from generator.plan.config import BuildConfig, config_toml, load_config
@@ -67,9 +69,28 @@ def run(
     lanes: dict[str, Any] | None = None,
     **options: Any,
 ) -> BuildResult:
-    """Build in this process. lanes: further arguments of open_executor; options: of build."""
+    """Build in this process. lanes: further arguments of open_executor; options: of build.
+
+    The plain local executor is opened once for all tests: its lanes take seconds to start.
+    """
+    if executor == "local" and not lanes:
+        return build(config, root, _local(), reporter or Quiet(), **options)
     with open_executor(executor, **(lanes or {})) as opened:
         return build(config, root, opened, reporter or Quiet(), **options)
+
+
+_open = ExitStack()
+
+
+@cache
+def _local() -> Executor:
+    return _open.enter_context(open_executor("local"))
+
+
+def close_lanes() -> None:
+    """End the lanes that :func:`run` keeps."""
+    _open.close()
+    _local.cache_clear()
 
 
 class Host:
