@@ -94,9 +94,12 @@ class HostProcess:
         return self.log[-1] if self.log else "it printed nothing"
 
     def interrupt(self) -> None:
-        """Ask it to end in order, as Ctrl-C does."""
+        """Ask it to end in order.
+
+        Not by SIGINT: programs started in the background, and what they start, ignore that.
+        """
         if self._process.poll() is None:
-            name = "CTRL_BREAK_EVENT" if os.name == "nt" else "SIGINT"
+            name = "CTRL_BREAK_EVENT" if os.name == "nt" else "SIGTERM"
             self._process.send_signal(getattr(signal, name))
 
     def close(self, timeout: float = 5.0) -> None:

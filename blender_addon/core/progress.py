@@ -12,6 +12,7 @@ EXIT_MEANING = {
     2: "wrong use",
     3: "finished, but something was left out",
     130: "stopped",
+    143: "stopped",
 }
 
 

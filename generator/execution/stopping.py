@@ -23,6 +23,7 @@ class Stopped(BaseException):
 def stoppable() -> Iterator[None]:
     """Raise Stopped in the main thread at the first signal; later ones do not disturb the cleaning up.
 
+    A signal that is ignored already stays so: under nohup a build outlives its terminal.
     Must be entered in the main thread.
     """
 
@@ -31,7 +32,8 @@ def stoppable() -> Iterator[None]:
             signal.signal(other, signal.SIG_IGN)
         raise Stopped(number)
 
-    before = {number: signal.signal(number, stop) for number in SIGNALS}
+    heeded = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, stop) for number in heeded}
     try:
         yield
     finally:

@@ -24,6 +24,7 @@ from generator.errors import DatasetError
 from generator.execution.folder import CONFIG_FILE
 from generator.execution.lock import LOCK_FILE
 from generator.execution.prepared_heads import PREPARED_FILE
+from generator.execution.stopping import Stopped, stoppable
 from generator.plan.config import BuildConfig
 
 Built = tuple[BuildConfig, Path]
@@ -191,6 +192,21 @@ def test_being_told_to_stop(number: signal.Signals, built: Built, tmp_path: Path
     assert not (root / "manifest.json").exists()
     assert run(built[0], root).complete
     check(root, built)
+
+
+def test_what_is_ignored_stays_ignored() -> None:
+    """nohup ignores SIGHUP for whatever it starts; a build must not end with its terminal after all."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stoppable():
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        with pytest.raises(Stopped) as stopped, stoppable():
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(5)
+        assert stopped.value.exit_code == 143
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def cut_short(path: Path, rng: np.random.Generator) -> None:
