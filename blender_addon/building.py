@@ -32,6 +32,7 @@ class Build:
     progress: Progress | None = None
     exit_code: int | None = None
     cancelled: bool = False
+    refused: bool = False
     last_line: str = ""
     _looked: float = field(default=0.0, repr=False)
 
@@ -62,7 +63,7 @@ class Build:
 
     def forget(self) -> None:
         """What the last build came to no longer counts."""
-        self.exit_code, self.cancelled, self.progress = None, False, None
+        self.exit_code, self.cancelled, self.refused, self.progress = None, False, False, None
         pictures.forget(LAST_IMAGE)
 
     def cancel(self) -> None:
@@ -101,9 +102,10 @@ class Build:
         if self.cancelled:
             return "stopped: Build continues where it ended"
         meaning = EXIT_MEANING.get(self.exit_code, f"ended with exit code {self.exit_code}")
-        if self.exit_code in (0, 3):
-            return f"{meaning}: {self.progress.line()}"
-        return f"{meaning}: {self.last_line}"
+        return f"{meaning}: {self._outcome()}"
+
+    def _outcome(self) -> str:
+        return self.progress.line() if self.exit_code in (0, 3) else self.last_line
 
     def _finish(self, code: int) -> None:
         self.exit_code = code
@@ -127,7 +129,7 @@ class Build:
         from .core.progress import EXIT_MEANING
 
         meaning = "stopped" if self.cancelled else EXIT_MEANING.get(self.exit_code, "ended")
-        return f"{meaning} (exit code {self.exit_code}): {self.progress.line()}"
+        return f"{meaning} (exit code {self.exit_code}): {self._outcome()}"
 
     def _look_at_images(self) -> None:
         newest = _newest(self.out / "images") if self.out is not None else None

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from . import pictures, session
+from . import gallery, session
 
 if TYPE_CHECKING:
     from .properties import HeadturnSettings
 
 NEUTRAL = "neutral"
-THUMBNAIL_PX = 128
 
 
 def cache_folder() -> Path:
@@ -33,6 +32,8 @@ def list_heads(scene: bpy.types.Scene) -> None:
 
     def take(answer: dict[str, Any]) -> None:
         state = session.state
+        gallery.forget()
+        state.displayed = None
         state.kind, state.skipped = answer["kind"], answer["skipped"]
         state.heads = [(head["subject"], head["expression"]) for head in answer["heads"]]
         found = bpy.data.scenes.get(name)
@@ -69,7 +70,11 @@ def show(shown: HeadturnSettings) -> None:
     """Have the host place the chosen head, then put it before the camera."""
     from . import studio
 
-    if session.is_quiet() or (shown.subject, shown.expression) not in session.state.heads:
+    there = session.state.expressions(shown.subject)
+    if session.is_quiet() or not there:
+        return
+    if shown.expression not in there:  # another subject was chosen
+        choose(shown, shown.subject)
         return
     subject, expression = shown.subject, shown.expression
     package = cache_folder() / f"{subject}-{expression}.npz"
@@ -89,7 +94,8 @@ def show(shown: HeadturnSettings) -> None:
             session.state.error = " ".join(str(error).split())
             return
         session.state.notes, session.state.vertices = answer["notes"], answer["vertices"]
-        _thumbnail(scene.headturn, subject, expression)
+        session.state.displayed = (subject, expression)
+        gallery.fill(scene.headturn)
         bpy.ops.ed.undo_push(message=f"Show {subject}")
 
     message = {
@@ -100,28 +106,6 @@ def show(shown: HeadturnSettings) -> None:
         "package": str(package),
     }
     session.request(message, f"finding the face of {subject}...", take)
-
-
-def thumbnail_key(subject: str, expression: str) -> str:
-    """Under which its small picture is kept."""
-    return f"{subject}/{expression}"
-
-
-def _thumbnail(shown: HeadturnSettings, subject: str, expression: str) -> None:
-    from . import landmarks
-
-    key = thumbnail_key(subject, expression)
-    if pictures.icon(key):
-        return
-    landmarks.request_pictures(
-        shown,
-        [(0.0, 0.0, 0.0)],
-        "",
-        lambda answer: pictures.keep(key, Path(answer["pictures"][0])),
-        render={"resolution": THUMBNAIL_PX},
-        landmarks=False,
-        folder=str(cache_folder() / "thumbnails" / f"{subject}-{expression}"),
-    )
 
 
 def _after(names: list[str], name: str, by: int) -> str:

@@ -61,6 +61,7 @@ def _ask() -> float | None:
 
     def take(answer: dict[str, Any]) -> None:
         session.state.landmarks = (angles, answer["landmarks"][0])
+        session.redraw_views()
 
     request_pictures(scene.headturn, [angles], "", take)
     return None

@@ -147,7 +147,11 @@ class PreviewExtremes(bpy.types.Operator):
             session.state.extremes = f"A face was found in {found} of {len(answer['landmarks'])}"
 
         shown = context.scene.headturn
-        poses = extremes(poses_table(shown))
+        try:
+            poses = extremes(poses_table(shown))
+        except _error_types() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         landmarks.request_pictures(shown, poses, "rendering the extremes...", take, sheet=3)
         return {"FINISHED"}
 
@@ -202,7 +206,10 @@ class BuildDataset(bpy.types.Operator):
         if building.current.runs or session.state.checking:
             return {"PASS_THROUGH"}
         context.window_manager.event_timer_remove(self._timer)
-        if building.current.exit_code not in (None, 0) and not building.current.cancelled:
+        if building.current.exit_code is None:
+            building.current.refused = True
+            self.report({"ERROR"}, session.state.error)
+        elif building.current.exit_code != 0 and not building.current.cancelled:
             self.report(
                 {"ERROR" if building.current.exit_code != 3 else "WARNING"}, building.current.headline()
             )

@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import ClassVar
 
 import bpy
 
-from . import building, heads, operators, pictures, session
+from . import __package__ as package
+from . import building, operators, pictures, session
+from .wrapping import message
 
-WIDTH_PER_CHARACTER = 7.2
-"""Pixels at a UI scale of 1, for breaking lines: Blender's labels do not wrap."""
+SKIPPED_SHOWN = 3
 
 
 class _Tab:
@@ -40,24 +40,52 @@ class HeadsPanel(_Tab, bpy.types.Panel):
         layout.operator("headturn.load_heads", icon="FILE_REFRESH")
         if state.error:
             message(layout, context, state.error, "ERROR")
-        elif state.checking or state.busy:
-            message(layout, context, state.busy or "looking for Headturn...", "SORTTIME")
-        if not state.heads:
-            return
+            if state.host_error:
+                layout.operator("preferences.addon_show", text="Open Preferences").module = package
+        elif busy := session.busy():
+            message(layout, context, busy, "SORTTIME")
+        if state.heads:
+            self._draw_heads(context)
+
+    def _draw_heads(self, context: bpy.types.Context) -> None:
+        layout, shown, state = self.layout, context.scene.headturn, session.state
         subjects = state.subjects()
-        left_out = f", {len(state.skipped)} left out" if state.skipped else ""
-        message(layout, context, f"{len(state.heads)} heads of {len(subjects)} subjects{left_out}", "INFO")
+        message(layout, context, f"{len(state.heads)} heads of {len(subjects)} subjects", "INFO")
         row = layout.row(align=True)
-        icon = pictures.icon(heads.thumbnail_key(shown.subject, shown.expression))
-        if icon:
-            row.template_icon(icon_value=icon, scale=4)
+        row.template_icon_view(shown, "gallery", show_labels=True, scale=4, scale_popup=4)
         column = row.column(align=True)
         _stepper(column, shown, "subject", "SUBJECT", len(subjects) > 1)
         _stepper(column, shown, "expression", "EXPRESSION", len(state.expressions(shown.subject)) > 1)
-        if shown.head is not None:
+        if state.displayed == (shown.subject, shown.expression):
             column.label(text=f"{state.vertices:,} vertices")
-        for note in state.notes:
-            message(layout, context, note, "DOT")
+            for note in state.notes:
+                message(layout, context, note, "DOT")
+        elif state.displayed is not None:
+            message(column, context, f"in view: {' '.join(state.displayed)}", "NONE", margin=16)
+        for reason in state.skipped[:SKIPPED_SHOWN]:
+            message(layout, context, f"left out: {reason}", "ERROR")
+        if len(state.skipped) > SKIPPED_SHOWN:
+            message(layout, context, f"and {len(state.skipped) - SKIPPED_SHOWN} more left out", "BLANK1")
+
+
+class SelectionPanel(_Tab, bpy.types.Panel):
+    """Which of the source's heads, and how its meshes lie."""
+
+    bl_idname = "HEADTURN_PT_selection"
+    bl_parent_id = "HEADTURN_PT_heads"
+    bl_label = "Selection"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, shown = self.layout, context.scene.headturn
+        layout.use_property_split, layout.use_property_decorate = True, False
+        column = layout.column(align=True)
+        column.prop(shown, "only_subjects")
+        column.prop(shown, "only_expressions")
+        if shown.source == "FOLDER":
+            column = layout.column(align=True)
+            for name in ("units", "up", "forward"):
+                column.prop(shown, name)
 
 
 class PosePanel(_Tab, bpy.types.Panel):
@@ -74,7 +102,9 @@ class PosePanel(_Tab, bpy.types.Panel):
             column.prop(shown, name, slider=True)
         row = layout.row(align=True)
         row.enabled = shown.head is not None
-        row.prop(shown, "snap", toggle=True)
+        cell = row.row(align=True)
+        cell.enabled = shown.plan == "grid"
+        cell.prop(shown, "snap", toggle=True)
         row.operator("headturn.reset_pose", icon="LOOP_BACK")
         row = layout.row(align=True)
         row.prop(shown, "viewport", expand=True)
@@ -97,7 +127,7 @@ class PosesPanel(_Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         from .core.errors import HeadturnError
-        from .core.grid import plan_poses
+        from .core.grid import NotDrawn, plan_poses
         from .settings import poses_table
 
         layout, shown = self.layout, context.scene.headturn
@@ -108,13 +138,20 @@ class PosesPanel(_Tab, bpy.types.Panel):
             column.prop(shown, "csv_path", text="")
         else:
             for name in ("yaw_range", "pitch_range", "roll_range"):
-                column.row(align=True).prop(shown, name)
+                row = column.row(align=True)
+                if shown.plan == "grid":
+                    row.prop(shown, name)
+                else:
+                    row.prop(shown, name, index=0)
+                    row.prop(shown, name, index=1, text="to")
         if shown.plan in ("uniform", "sobol"):
             row = layout.row(align=True)
             row.prop(shown, "pose_count")
             row.prop(shown, "pose_seed")
         try:
             count = len(plan_poses(poses_table(shown)))
+        except NotDrawn:
+            count = shown.pose_count
         except HeadturnError as error:
             message(layout, context, str(error), "ERROR")
             return
@@ -185,17 +222,10 @@ class BuildPanel(_Tab, bpy.types.Panel):
             icon = pictures.icon(building.LAST_IMAGE)
             if icon:
                 layout.template_icon(icon_value=icon, scale=6)
+        elif build.refused and session.state.error:
+            message(layout, context, session.state.error, "ERROR")
         if building.REPORT in bpy.data.texts:
             layout.operator("headturn.report", icon="TEXT")
-
-
-def message(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
-    """A label of as many lines as the sidebar's width needs; nothing is cut off."""
-    scale = context.preferences.system.ui_scale
-    characters = max(16, int(context.region.width / scale / WIDTH_PER_CHARACTER) - 6)
-    column = layout.column(align=True)
-    for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
 def _stepper(
@@ -212,7 +242,7 @@ def _stepper(
         button.what, button.by = what, by
 
 
-_CLASSES = (HeadsPanel, PosePanel, PosesPanel, LookPanel, BuildPanel)
+_CLASSES = (HeadsPanel, SelectionPanel, PosePanel, PosesPanel, LookPanel, BuildPanel)
 
 
 def register() -> None:

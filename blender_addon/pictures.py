@@ -19,15 +19,26 @@ def keep(key: str, path: Path) -> None:
     _collections[0].load(key, str(path), "IMAGE", force_reload=True)
 
 
+def kept(key: str) -> bool:
+    """Is there one under key?"""
+    return bool(_collections) and key in _collections[0]
+
+
 def icon(key: str) -> int:
-    """For template_icon; 0 if there is none."""
-    return _collections[0][key].icon_id if _collections and key in _collections[0] else 0
+    """For template_icon; 0 if there is none, or no window."""
+    return _collections[0][key].icon_id if kept(key) else 0
 
 
 def forget(key: str) -> None:
     """Show nothing under key."""
-    if _collections and key in _collections[0]:
+    if kept(key):
         del _collections[0][key]
+
+
+def forget_group(start: str) -> None:
+    """Show nothing under any key that starts so."""
+    for key in [key for collection in _collections for key in collection if key.startswith(start)]:
+        forget(key)
 
 
 def clear() -> None:

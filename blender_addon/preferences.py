@@ -7,6 +7,10 @@ import bpy
 
 from . import __package__ as package
 from . import session
+from .wrapping import message
+
+MARGIN = 16
+"""Characters that the page's indents take."""
 
 
 def _python_changed(self: HeadturnPreferences, context: bpy.types.Context) -> None:
@@ -41,10 +45,10 @@ class HeadturnPreferences(bpy.types.AddonPreferences):
         if session.state.checking:
             box.label(text="asking...", icon="SORTTIME")
         elif session.state.host_error:
-            box.label(text=session.state.host_error, icon="ERROR")
+            message(box, context, session.state.host_error, "ERROR", margin=MARGIN)
         elif session.state.facts is not None:
             host = session.state.host
-            box.label(text=f"{host.command[0]} ({host.found_by})", icon="CHECKMARK")
+            message(box, context, f"{host.command[0]} ({host.found_by})", "CHECKMARK", margin=MARGIN)
             for line in session.state.facts.lines():
                 box.label(text=line, icon="BLANK1")
         else:

@@ -16,54 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import session
-
-
-def _pose_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    from . import studio
-
-    studio.pose_changed(self)
-
-
-def _look_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    from . import studio
-
-    studio.look_changed(self.id_data)
-
-
-def _plan_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    from . import timeline
-
-    timeline.plan_changed(self.id_data)
-
-
-def _view_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    from . import studio
-
-    studio.show_views(self)
-
-
-def _choice_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    from . import heads
-
-    heads.show(self)
-
-
-def _subjects(self: HeadturnSettings, context: bpy.types.Context, text: str) -> list[str]:
-    return session.state.subjects()
-
-
-def _expressions(self: HeadturnSettings, context: bpy.types.Context, text: str) -> list[str]:
-    return session.state.expressions(self.subject)
-
-
-def _overlay_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    session.redraw()
-
-
-def _source_changed(self: HeadturnSettings, context: bpy.types.Context) -> None:
-    if not session.is_quiet():
-        session.state.heads, session.state.kind, session.state.error = [], "", ""
+from . import edits, gallery
 
 
 def _angle(name: str, description: str, limit: float) -> Any:
@@ -76,7 +29,17 @@ def _angle(name: str, description: str, limit: float) -> Any:
         soft_max=60,
         step=100,
         precision=1,
-        update=_pose_changed,
+        update=edits.pose,
+    )
+
+
+def _axis(name: str, description: str) -> Any:
+    axes = [sign + letter for letter in "XYZ" for sign in "+-"]
+    return EnumProperty(
+        name=name,
+        description=description,
+        items=[("GUESS", "Guess", "Found from the face"), *((axis, axis, "") for axis in axes)],
+        update=edits.source,
     )
 
 
@@ -90,7 +53,7 @@ def _range(name: str, reach: float, limit: float) -> Any:
         max=limit,
         precision=1,
         step=100,
-        update=_plan_changed,
+        update=edits.plan,
     )
 
 
@@ -104,36 +67,43 @@ class HeadturnSettings(bpy.types.PropertyGroup):
     subject: StringProperty(  # type: ignore[valid-type]
         name="Subject",
         description="Which head is shown",
-        search=_subjects,
-        update=_choice_changed,
+        search=edits.subjects,
+        update=edits.choice,
     )
     expression: StringProperty(  # type: ignore[valid-type]
         name="Expression",
         description="Which expression of this subject is shown",
-        search=_expressions,
-        update=_choice_changed,
+        search=edits.expressions,
+        update=edits.choice,
+    )
+    gallery: EnumProperty(  # type: ignore[valid-type]
+        name="Head",
+        description="All heads of the source, up to 50 before and after this one",
+        items=gallery.items,
+        get=gallery.chosen,
+        set=gallery.choose,
     )
     yaw: _angle("Yaw", "Turn: above zero the nose goes to image left. Degrees", 89.9)  # type: ignore[valid-type]
     pitch: _angle("Pitch", "Nod: above zero the nose goes up. Degrees", 180)  # type: ignore[valid-type]
     roll: _angle("Roll", "Tilt: above zero the crown goes to image right. Degrees", 180)  # type: ignore[valid-type]
     snap: BoolProperty(  # type: ignore[valid-type]
-        name="Snap to Grid", description="Sliders stop at the poses of the grid only", update=_pose_changed
+        name="Snap to Grid", description="Sliders stop at the poses of the grid only", update=edits.pose
     )
     on_timeline: BoolProperty(  # type: ignore[valid-type]
         name="Poses on the Timeline",
         description="Frame k shows pose k of the plan: scrub or play to see the dataset",
-        update=_plan_changed,
+        update=edits.plan,
     )
     show_axes: BoolProperty(  # type: ignore[valid-type]
         name="Axes",
         description="Draw the head's frame: red to its left, green up, blue to the front",
         default=True,
-        update=_overlay_changed,
+        update=edits.overlay,
     )
     show_landmarks: BoolProperty(  # type: ignore[valid-type]
         name="Landmarks",
         description="Have the host render this pose and draw the 468 points that it finds",
-        update=_pose_changed,
+        update=edits.pose,
     )
     viewport: EnumProperty(  # type: ignore[valid-type]
         name="Viewport",
@@ -141,7 +111,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("SOLID", "Quick", "Texture without light: follows every slider at once"),
             ("RENDERED", "As Rendered", "Cycles with the light of the build: what the images will show"),
         ),
-        update=_view_changed,
+        update=edits.view,
     )
 
     # [heads]
@@ -151,26 +121,51 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("PARAMETRIC", "Parametric", "Heads made on the spot from MakeHuman's CC0 data"),
             ("FOLDER", "Folder", "A FaceScape download, a folder of meshes, or folders of subjects"),
         ),
-        update=_source_changed,
+        update=edits.source,
     )
     folder: StringProperty(  # type: ignore[valid-type]
         name="Folder",
         description="A FaceScape download, a folder of OBJ, PLY, GLB or FBX, or folders of subjects",
         subtype="DIR_PATH",
-        update=_source_changed,
+        update=edits.source,
     )
     count: IntProperty(  # type: ignore[valid-type]
-        name="Heads", description="Parametric heads to make", default=3, min=1, update=_source_changed
+        name="Heads", description="Parametric heads to make", default=3, min=1, update=edits.source
     )
     seed: IntProperty(  # type: ignore[valid-type]
-        name="Seed", description="The same seed makes the same heads", min=0, update=_source_changed
+        name="Seed", description="The same seed makes the same heads", min=0, update=edits.source
     )
     sampled_expressions: IntProperty(  # type: ignore[valid-type]
         name="Expressions",
         description="Sampled expressions a parametric head, besides the neutral face",
         min=0,
-        update=_source_changed,
+        update=edits.source,
     )
+    only_subjects: StringProperty(  # type: ignore[valid-type]
+        name="Subjects",
+        description="Only these, separated by commas. Empty: all of them",
+        update=edits.source,
+    )
+    only_expressions: StringProperty(  # type: ignore[valid-type]
+        name="Expressions",
+        description="Only these, separated by commas, such as neutral, smile. Empty: all of them",
+        update=edits.source,
+    )
+    units: EnumProperty(  # type: ignore[valid-type]
+        name="Units",
+        description="Units of the meshes. FaceScape's are known",
+        items=(
+            ("GUESS", "Guess", "Found from the size of the face"),
+            ("um", "Micrometres", ""),
+            ("mm", "Millimetres", ""),
+            ("cm", "Centimetres", ""),
+            ("dm", "Decimetres", ""),
+            ("m", "Metres", ""),
+        ),
+        update=edits.source,
+    )
+    up: _axis("Up", "Which way the meshes' crown points")  # type: ignore[valid-type]
+    forward: _axis("Forward", "Which way the meshes' nose points")  # type: ignore[valid-type]
 
     # [poses]
     plan: EnumProperty(  # type: ignore[valid-type]
@@ -181,7 +176,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("sobol", "Sobol", "Random poses, evenly spread"),
             ("csv", "CSV File", "The poses of a table"),
         ),
-        update=_plan_changed,
+        update=edits.plan,
     )
     frame: EnumProperty(  # type: ignore[valid-type]
         name="Pose Zero",
@@ -189,20 +184,20 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("source", "As Modelled", "Pose zero is the mesh's own axes"),
             ("canonical", "Levelled", "Every head is levelled to the same face first"),
         ),
-        update=_choice_changed,
+        update=edits.choice,
     )
     yaw_range: _range("Yaw", 50, 89.9)  # type: ignore[valid-type]
     pitch_range: _range("Pitch", 40, 180)  # type: ignore[valid-type]
     roll_range: _range("Roll", 30, 180)  # type: ignore[valid-type]
     pose_count: IntProperty(  # type: ignore[valid-type]
-        name="Count", description="Random poses a head", default=693, min=1, update=_plan_changed
+        name="Count", description="Random poses a head", default=693, min=1, update=edits.plan
     )
-    pose_seed: IntProperty(name="Seed", description="Of random poses", min=0, update=_plan_changed)  # type: ignore[valid-type]
+    pose_seed: IntProperty(name="Seed", description="Of random poses", min=0, update=edits.plan)  # type: ignore[valid-type]
     csv_path: StringProperty(  # type: ignore[valid-type]
         name="File",
         description="Columns yaw_deg, pitch_deg, roll_deg",
         subtype="FILE_PATH",
-        update=_plan_changed,
+        update=edits.plan,
     )
 
     # [render]
@@ -212,7 +207,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("fast", "Fast", "Light computed from the normal: no noise, quick"),
             ("quality", "Quality", "Path traced, soft shadows"),
         ),
-        update=_look_changed,
+        update=edits.look,
     )
     resolution: IntProperty(  # type: ignore[valid-type]
         name="Resolution",
@@ -220,7 +215,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         default=256,
         min=16,
         max=4096,
-        update=_look_changed,
+        update=edits.look,
     )
     lens_mm: FloatProperty(  # type: ignore[valid-type]
         name="Lens",
@@ -230,7 +225,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         max=1000,
         precision=1,
         step=100,
-        update=_look_changed,
+        update=edits.look,
     )
     projection: EnumProperty(  # type: ignore[valid-type]
         name="Projection",
@@ -238,13 +233,13 @@ class HeadturnSettings(bpy.types.PropertyGroup):
             ("perspective", "Perspective", "A real camera"),
             ("orthographic", "Orthographic", "Parallel rays, the scale of the lens at the pivot"),
         ),
-        update=_look_changed,
+        update=edits.look,
     )
     frame_head: BoolProperty(  # type: ignore[valid-type]
         name="Frame Each Head",
         description="The camera stands where the head just fits at every pose",
         default=True,
-        update=_look_changed,
+        update=edits.look,
     )
     distance_mm: FloatProperty(  # type: ignore[valid-type]
         name="Distance",
@@ -254,7 +249,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         max=100_000,
         precision=1,
         step=1000,
-        update=_look_changed,
+        update=edits.look,
     )
     light_yaw_deg: FloatProperty(  # type: ignore[valid-type]
         name="Light Yaw",
@@ -264,7 +259,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         max=180,
         precision=1,
         step=100,
-        update=_look_changed,
+        update=edits.look,
     )
     light_pitch_deg: FloatProperty(  # type: ignore[valid-type]
         name="Light Pitch",
@@ -274,7 +269,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         max=90,
         precision=1,
         step=100,
-        update=_look_changed,
+        update=edits.look,
     )
     ambient: FloatProperty(  # type: ignore[valid-type]
         name="Ambient",
@@ -283,7 +278,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         min=0,
         max=1,
         subtype="FACTOR",
-        update=_look_changed,
+        update=edits.look,
     )
     background: FloatVectorProperty(  # type: ignore[valid-type]
         name="Background",
@@ -293,7 +288,7 @@ class HeadturnSettings(bpy.types.PropertyGroup):
         min=0,
         max=1,
         subtype="COLOR_GAMMA",
-        update=_look_changed,
+        update=edits.look,
     )
 
     # [dataset] and the build.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +25,19 @@ TICK_S = 0.1
 OnAnswer = Callable[[dict[str, Any]], None]
 
 
+@dataclass(frozen=True)
+class Question:
+    """A line for the preview server, and who takes the answer, or the reason why there is none.
+
+    busy: what the panel says until the answer comes; None if nobody waits for it.
+    """
+
+    message: dict[str, Any]
+    on_answer: OnAnswer
+    on_error: Callable[[str], None]
+    busy: str | None = None
+
+
 @dataclass
 class State:
     """Shown by the panel; not saved with the file."""
@@ -33,13 +46,13 @@ class State:
     facts: HostFacts | None = None
     host_error: str = ""
     checking: bool = False
-    busy: str = ""
     error: str = ""
     kind: str = ""
     heads: list[tuple[str, str]] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     vertices: int = 0
+    displayed: tuple[str, str] | None = None
     extremes: str = ""
     landmarks: tuple[tuple[float, ...], list[list[float]] | None] | None = None
 
@@ -54,7 +67,8 @@ class State:
 
 state = State()
 _server: HostProcess | None = None
-_waiting: deque[tuple[str, OnAnswer]] = deque()
+_waiting: deque[Question] = deque()
+_later: deque[Question] = deque()
 _found: deque[Callable[[], None]] = deque()
 _quiet: list[None] = []
 
@@ -75,28 +89,38 @@ def is_quiet() -> bool:
 
 
 def request(message: dict[str, Any], busy: str, on_answer: OnAnswer) -> None:
-    """Ask the preview server; on_answer gets what it said, later, in Blender's main thread."""
+    """Ask the preview server; on_answer gets what it said, later, in Blender's main thread.
 
-    def ask() -> None:
-        global _server
-        from .core.errors import HeadturnError
-        from .core.host import host_command
-        from .core.process import HostProcess
+    A reason why it cannot is shown in the panel.
+    """
+    state.error = ""
+    with_host(lambda: _ask(Question(message, on_answer, _fail, busy)))
 
-        try:
-            if _server is None or _server.exit_code is not None:
-                command = host_command(state.host, state.facts, ["preview-server"], bpy.app.binary_path)
-                _server = HostProcess(command)
-            _server.send(message)
-        except HeadturnError as error:
-            _fail(str(error))
-            return
-        _waiting.append((busy, on_answer))
-        state.busy = _waiting[0][0]
+
+def ask_later(questions: Iterable[Question]) -> None:
+    """What to ask, one by one, while nothing else is asked; in place of what was to be asked before."""
+    _later.clear()
+    _later.extend(questions)
+    if _later and state.facts is not None:
         _start_ticking()
 
-    state.error = ""
-    with_host(ask)
+
+def _ask(question: Question) -> None:
+    global _server
+    from .core.errors import HeadturnError
+    from .core.host import host_command
+    from .core.process import HostProcess
+
+    try:
+        if _server is None or _server.exit_code is not None:
+            command = host_command(state.host, state.facts, ["preview-server"], bpy.app.binary_path)
+            _server = HostProcess(command)
+        _server.send(question.message)
+    except HeadturnError as error:
+        _fail(str(error))
+        return
+    _waiting.append(question)
+    _start_ticking()
 
 
 def with_host(then: Callable[[], None], *, beside: Path | None = None) -> None:
@@ -144,7 +168,7 @@ def close() -> None:
     """End the preview server; nothing that was asked will be answered."""
     global _server
     _waiting.clear()
-    state.busy = ""
+    _later.clear()
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     if _server is not None:
@@ -152,21 +176,49 @@ def close() -> None:
         _server = None
 
 
+def forget() -> None:
+    """The extension is disabled: what was found no longer counts."""
+    close()
+    state.__init__()  # type: ignore[misc]
+
+
 def is_busy() -> bool:
-    """Is an answer due?"""
-    return bool(_waiting) or state.checking
+    """Is an answer due that somebody waits for?"""
+    return state.checking or any(question.busy is not None for question in _waiting)
+
+
+def busy() -> str:
+    """What is going on, for the panel; empty if nobody needs to know."""
+    if state.checking:
+        return "looking for Headturn..."
+    return next((question.busy for question in _waiting if question.busy), "")
 
 
 def redraw() -> None:
-    """Redraw the 3D views and preferences of every window."""
+    """Redraw what shows words: the sidebars and the preferences. The 3D views stay: they cost most."""
+    for area in _areas():
+        if area.type == "PREFERENCES":
+            area.tag_redraw()
+        elif area.type == "VIEW_3D":
+            for region in area.regions:
+                if region.type == "UI":
+                    region.tag_redraw()
+
+
+def redraw_views() -> None:
+    """Redraw the 3D views with all that lies over them."""
+    for area in _areas():
+        if area.type == "VIEW_3D":
+            area.tag_redraw()
+
+
+def _areas() -> Iterator[bpy.types.Area]:
     for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in ("VIEW_3D", "PREFERENCES"):
-                area.tag_redraw()
+        yield from window.screen.areas
 
 
 def _fail(message: str) -> None:
-    state.error, state.busy = message, ""
+    state.error = message
     redraw()
 
 
@@ -182,14 +234,16 @@ def _tick() -> float | None:
         redraw()
     if _server is not None and _waiting:
         for answer in _server.poll():
-            _, on_answer = _waiting.popleft()
-            state.busy = _waiting[0][0] if _waiting else ""
+            question = _waiting.popleft()
             if "error" in answer:
-                _fail(answer["error"])
+                question.on_error(answer["error"])
             else:
-                on_answer(answer)
+                question.on_answer(answer)
             redraw()
         if _waiting and _server.exit_code is not None:
             _waiting.clear()
+            _later.clear()
             _fail(f"the host ended: {_server.last_words()}")
-    return TICK_S if is_busy() or _found else None
+    if _later and not _waiting and not state.checking:
+        _ask(_later.popleft())
+    return TICK_S if _waiting or state.checking or _found else None

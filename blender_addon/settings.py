@@ -10,49 +10,58 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from . import session
-from .core.config import Config, merged, number, read_config, write_config
+from .core.config import (
+    Config,
+    join_names,
+    merged,
+    number,
+    read_config,
+    same,
+    split_names,
+    write_config,
+)
 
 if TYPE_CHECKING:
     from .properties import HeadturnSettings
 
 PARAMETRIC = "parametric"
+GUESS = "GUESS"
 RENDER = ("preset", "projection", "resolution", "lens_mm", "light_yaw_deg", "light_pitch_deg", "ambient")
 DATASET = ("images", "image_format", "validation")
 RANGES = ("yaw", "pitch", "roll")
+MADE = ("count", "seed", "sampled_expressions")
+LISTS = {"subjects": "only_subjects", "expressions": "only_expressions"}
+MESHES = ("units", "up", "forward")
+POSES = {"kind": "plan", "frame": "frame", "count": "pose_count", "seed": "pose_seed", "path": "csv_path"}
+SHOWN = (
+    *("source", "folder", *MADE, *LISTS.values(), *MESHES, *POSES.values()),
+    *(f"{name}_range" for name in RANGES),
+    *(*RENDER, "background", "frame_head", "distance_mm", *DATASET),
+)
+"""Every setting of the scene that belongs to the configuration."""
 
 
 def to_config(settings: HeadturnSettings) -> Config:
     """The configuration that this scene shows; what a loaded file held besides is kept."""
-    shown: Config = {
-        "heads": _heads(settings),
-        "poses": poses_table(settings),
-        "render": {name: _plain(getattr(settings, name)) for name in RENDER},
-        "dataset": {name: _plain(getattr(settings, name)) for name in DATASET},
-    }
-    shown["render"]["background"] = [number(c) for c in settings.background]
-    shown["render"]["distance_mm"] = None if settings.frame_head else number(settings.distance_mm)
-    return merged(json.loads(settings.carried or "{}"), shown)
+    return merged(json.loads(settings.carried or "{}"), _shown(settings))
 
 
 def from_config(settings: HeadturnSettings, config: Config) -> None:
-    """Show a configuration. Raises TypeError or ValueError if a value does not fit."""
+    """Show a configuration; what it does not say is as on the command line.
+
+    Raises TypeError, ValueError or OverflowError if the panel cannot show a value.
+    """
     heads, poses = config.get("heads", {}), config.get("poses", {})
     render, dataset = config.get("render", {}), config.get("dataset", {})
     with session.quiet():
+        for name in SHOWN:
+            settings.property_unset(name)
         source = heads.get("source", PARAMETRIC)
         settings.source = "PARAMETRIC" if source == PARAMETRIC else "FOLDER"
         settings.folder = "" if source == PARAMETRIC else source
-        values: dict[str, Any] = {
-            name: heads[name] for name in ("count", "seed", "sampled_expressions") if name in heads
-        }
-        renamed = {
-            "kind": "plan",
-            "frame": "frame",
-            "count": "pose_count",
-            "seed": "pose_seed",
-            "path": "csv_path",
-        }
-        values |= {renamed[name]: poses[name] for name in renamed if name in poses}
+        values: dict[str, Any] = {name: heads[name] for name in (*MADE, *MESHES) if name in heads}
+        values |= {LISTS[name]: join_names(heads[name]) for name in LISTS if name in heads}
+        values |= {POSES[name]: poses[name] for name in POSES if name in poses}
         for name in RANGES:
             if name in poses:
                 step = getattr(settings, f"{name}_range")[2]
@@ -65,6 +74,13 @@ def from_config(settings: HeadturnSettings, config: Config) -> None:
         for name, value in values.items():
             setattr(settings, name, value)
         settings.carried = json.dumps(config)
+    # Blender moves a number that is out of range to the end of the range.
+    for section, table in _shown(settings).items():
+        for key, value in table.items():
+            told = config.get(section, {}).get(key)
+            checked = value is not None and told is not None and key not in ("source", "path")
+            if checked and not same(told, value):
+                raise ValueError(f"{section}.{key}: the panel cannot show {told!r}")
 
 
 def load(settings: HeadturnSettings, path: Path) -> None:
@@ -75,7 +91,7 @@ def load(settings: HeadturnSettings, path: Path) -> None:
     before = to_config(settings)
     try:
         from_config(settings, config)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         from_config(settings, before)
         raise UsageError(f"{path}: {' '.join(str(error).split())}") from error
 
@@ -87,30 +103,46 @@ def save(settings: HeadturnSettings, path: Path) -> None:
 
 def poses_table(settings: HeadturnSettings) -> dict[str, Any]:
     """The [poses] table."""
-    ends = 3 if settings.plan == "grid" else 2
-    table: dict[str, Any] = {
-        name: [number(v) for v in getattr(settings, f"{name}_range")][:ends] for name in RANGES
-    }
-    path = bpy.path.abspath(settings.csv_path) if settings.plan == "csv" and settings.csv_path else None
+    told = json.loads(settings.carried or "{}").get("poses", {})
+    table: dict[str, Any] = {}
+    for name in RANGES:  # random plans need no step, but a file may name one
+        ends = 3 if settings.plan == "grid" else len(told.get(name, "ab"))
+        table[name] = [number(v) for v in getattr(settings, f"{name}_range")][:ends]
     return {
         "kind": settings.plan,
         "frame": settings.frame,
         **table,
         "count": settings.pose_count,
         "seed": settings.pose_seed,
-        "path": path,
+        "path": _absolute(settings.csv_path) or None,
     }
 
 
+def _shown(settings: HeadturnSettings) -> Config:
+    shown: Config = {
+        "heads": _heads(settings),
+        "poses": poses_table(settings),
+        "render": {name: _plain(getattr(settings, name)) for name in RENDER},
+        "dataset": {name: _plain(getattr(settings, name)) for name in DATASET},
+    }
+    shown["render"]["background"] = [number(c) for c in settings.background]
+    shown["render"]["distance_mm"] = None if settings.frame_head else number(settings.distance_mm)
+    return shown
+
+
 def _heads(settings: HeadturnSettings) -> dict[str, Any]:
+    table: dict[str, Any] = {name: split_names(getattr(settings, LISTS[name])) for name in LISTS}
     if settings.source == "PARAMETRIC":
-        return {
-            "source": PARAMETRIC,
-            "count": settings.count,
-            "seed": settings.seed,
-            "sampled_expressions": settings.sampled_expressions,
-        }
-    return {"source": str(Path(bpy.path.abspath(settings.folder)).absolute()) if settings.folder else ""}
+        made = {name: getattr(settings, name) for name in MADE}
+        return {"source": PARAMETRIC, **made, **table, **dict.fromkeys(MESHES)}
+    for name in MESHES:
+        value = getattr(settings, name)
+        table[name] = None if value == GUESS else value
+    return {"source": _absolute(settings.folder), **table}
+
+
+def _absolute(path: str) -> str:
+    return str(Path(bpy.path.abspath(path)).absolute()) if path else ""
 
 
 def _plain(value: Any) -> Any:

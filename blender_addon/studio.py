@@ -33,7 +33,7 @@ def studio_scene() -> bpy.types.Scene:
         return current
     scene = bpy.data.scenes.new(SCENE)
     with session.quiet():
-        for name in set(current.headturn.bl_rna.properties.keys()) - {"rna_type", "name", "head"}:
+        for name in set(current.headturn.bl_rna.properties.keys()) - {"rna_type", "name", "head", "gallery"}:
             setattr(scene.headturn, name, getattr(current.headturn, name))
     for window in bpy.context.window_manager.windows:
         if window.scene == current:
@@ -142,7 +142,7 @@ def show_views(shown: HeadturnSettings) -> None:
         space.shading.color_type = "TEXTURE"
         space.shading.background_type = "VIEWPORT"
         space.shading.background_color = srgb_to_linear(tuple(shown.background))
-    session.redraw()
+    session.redraw_views()
 
 
 def _views(scene: bpy.types.Scene) -> list[bpy.types.SpaceView3D]:

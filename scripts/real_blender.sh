@@ -64,7 +64,7 @@ exec unshare --mount --propagation private bash -c '
         mkdir -p "\$root\$folder" && mount --rbind "\$folder" "\$root\$folder" || exit 1
     done
     kept=()
-    for name in \$(compgen -e HEADTURN_; compgen -e BLENDER_; compgen -e DISPLAY); do
+    for name in \$(compgen -e HEADTURN_; compgen -e BLENDER_; compgen -e DISPLAY; compgen -e TMPDIR); do
         kept+=("\$name=\${!name}")
     done
     mkdir -p "\$root/var/home"

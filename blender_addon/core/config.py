@@ -7,8 +7,12 @@ those that no panel shows, and the host checks them when a build starts.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
+import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,16 +69,43 @@ def _value(value: Any) -> str:
 
 
 def merged(base: Config, shown: Config) -> Config:
-    """base with what the panel shows laid over it; a shown None removes the key."""
+    """base with what the panel shows laid over it; a shown None removes the key.
+
+    Blender's numbers have 32 bits: where the panel shows one of base, base's own digits stay.
+    """
     result = {}
     for section in SECTIONS:
-        table = {**base.get(section, {}), **shown.get(section, {})}
-        if table := {key: value for key, value in table.items() if value is not None}:
+        there, over = base.get(section, {}), shown.get(section, {})
+        told = {key: value for key, value in there.items() if key in over and same(value, over[key])}
+        if table := {key: value for key, value in {**there, **over, **told}.items() if value is not None}:
             result[section] = table
     return result
 
 
+def same(value: Any, shown: Any) -> bool:
+    """Is this value what the panel shows, as exactly as it can?"""
+    if isinstance(value, (list, tuple)) and isinstance(shown, (list, tuple)):
+        return len(value) == len(shown) and all(map(same, value, shown))
+    if isinstance(value, float) or isinstance(shown, float):
+        numbers = (int, float)
+        return isinstance(value, numbers) and isinstance(shown, numbers) and number(value) == number(shown)
+    return bool(value == shown)
+
+
+def split_names(text: str) -> list[str] | None:
+    """The names of a field, separated by commas; None if there is none. Quotes keep a comma in a name."""
+    names = next(csv.reader([text], skipinitialspace=True), [])
+    return [name.strip() for name in names if name.strip()] or None
+
+
+def join_names(names: Sequence[str]) -> str:
+    """The field that :func:`split_names` reads."""
+    line = io.StringIO()
+    csv.writer(line, lineterminator="").writerow(names)
+    return line.getvalue()
+
+
 def number(value: float) -> float | int:
     """A 32-bit number as it was typed: 0.1, not 0.10000000149011612."""
-    short = float(f"{value:.7g}")
+    short = float(f"{struct.unpack('f', struct.pack('f', value))[0]:.7g}")
     return int(short) if short.is_integer() else short

@@ -8,21 +8,42 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from generator.errors import UsageError
-from generator.plan.poses import PosePlan, csv_plan, grid_plan, uniform_plan
+from generator.plan.poses import OFF_GRID, PosePlan, csv_plan, grid_plan, uniform_plan
 
 RANGES = ("yaw", "pitch", "roll")
+
+
+_drawn: dict[Any, PosePlan] = {}
+
+
+class NotDrawn(UsageError):
+    """A Sobol plan that the host has not drawn yet: it takes SciPy, which Blender lacks."""
 
 
 def plan_poses(poses: dict[str, Any]) -> PosePlan:
     """The plan of a [poses] table; the last few are kept.
 
-    Raises UsageError if it makes no sense, or needs the host (Sobol sequences).
+    Raises UsageError if it makes no sense, NotDrawn if the host has to draw it first.
     """
+    key = _key(poses)
+    return _drawn[key] if key in _drawn else _plan(*key)
+
+
+def remember(poses: dict[str, Any], file: Path) -> None:
+    """Take what the host drew for a [poses] table: float64 [N, 3] in an .npy file, degrees."""
+    angles = np.load(file)
+    _drawn.clear()
+    _drawn[_key(poses)] = PosePlan(angles, np.full(angles.shape, OFF_GRID, dtype=np.int16), poses["kind"])
+
+
+def _key(poses: dict[str, Any]) -> tuple[Any, ...]:
     path = poses.get("path") or ""
     stamp = Path(path).stat().st_mtime_ns if path and Path(path).is_file() else 0
     ranges = tuple(tuple(poses[name]) for name in RANGES)
-    return _plan(poses["kind"], ranges, int(poses["count"]), int(poses["seed"]), path, stamp)
+    return poses["kind"], ranges, int(poses["count"]), int(poses["seed"]), path, stamp
 
 
 @lru_cache(maxsize=8)
@@ -37,7 +58,7 @@ def _plan(
         if not path:
             raise UsageError("choose the CSV file of the poses")
         return csv_plan(Path(path))
-    raise UsageError("Sobol poses are drawn when the dataset is built: they are not on the timeline")
+    raise NotDrawn("the host has not drawn these poses yet")
 
 
 def snapped(angle: float, axis: Sequence[float]) -> float:
@@ -49,11 +70,15 @@ def snapped(angle: float, axis: Sequence[float]) -> float:
 
 def extremes(poses: dict[str, Any]) -> list[tuple[float, float, float]]:
     """Nine poses for a contact sheet: the ends of yaw and pitch and zero between them, corners rolled."""
-    yaw, pitch, roll = (poses[name] for name in RANGES)
+    if poses["kind"] == "csv":
+        angles = plan_poses(poses).angles_deg
+        ends = list(zip(angles.min(axis=0).tolist(), angles.max(axis=0).tolist(), strict=True))
+    else:
+        ends = [tuple(map(float, poses[name][:2])) for name in RANGES]
+    yaw, pitch, roll = ((low, min(max(0.0, low), high), high) for low, high in ends)
     rows = []
-    for p in (pitch[1], 0.0, pitch[0]):
-        for y in (yaw[0], 0.0, yaw[1]):
-            corner = (p != 0) and (y != 0)
-            r = 0.0 if not corner else (roll[1] if (y > 0) == (p > 0) else roll[0])
-            rows.append((float(y), float(p), float(r)))
+    for down, p in enumerate(reversed(pitch)):
+        for across, y in enumerate(yaw):
+            side = (across - 1) * (1 - down)  # 0 but for the corners
+            rows.append((y, p, roll[1 + side]))
     return rows

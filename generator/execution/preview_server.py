@@ -14,10 +14,15 @@ that fails is answered with ``{"error": "one line"}``. It ends when stdin closes
 "folder", "landmarks": bool, "sheet": columns}``
     renders poses as a build would: ``{"pictures": [path, ...], "landmarks": [[[x, y], ...] or null, ...]}``
     and, with columns, ``"sheet": path``, all of them in one picture with the landmarks drawn
+``{"op": "thumbnail", "subject", "expression", "frame", "pixels", "cache": FOLDER}``
+    a small picture of a head at pose zero, made once for the same files: ``{"picture": path}``
+``{"op": "plan", "poses": {...}, "file": FILE.npy}``
+    writes the poses of a [poses] table as float64 [N, 3], degrees: ``{"count": N}``
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -30,6 +35,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from generator.dataset.files import file_sha256
 from generator.errors import HeadError, HeadturnError, UsageError
 from generator.execution.build import find_source
 from generator.execution.lane import Lane, LaneOptions
@@ -37,6 +43,7 @@ from generator.execution.prepare import Prepared
 from generator.execution.preview import DOT
 from generator.execution.renderer import check_blender
 from generator.execution.scratch import scratch_folder
+from generator.execution.units import camera_distance
 from generator.heads.head import NEUTRAL, Head, HeadSource
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
@@ -110,6 +117,7 @@ class PreviewServer:
 
     def __init__(self, scratch: Path, stack: ExitStack, blender: str | None = None) -> None:
         self._options = LaneOptions(scratch=str(scratch), blender=blender)
+        self._scratch = scratch
         self._stack = stack
         self._lane: _PreviewLane | None = None
         self._source: HeadSource | None = None
@@ -124,6 +132,10 @@ class PreviewServer:
             return self._place(**request)
         if operation == "pictures":
             return self._open_lane().pictures(**request)
+        if operation == "thumbnail":
+            return self._thumbnail(**request)
+        if operation == "plan":
+            return _draw_plan(**request)
         raise UsageError(f"the preview server knows no {operation!r}: extension and host differ in version")
 
     def _list(self, heads: dict[str, Any], cache: str) -> dict[str, Any]:
@@ -141,15 +153,51 @@ class PreviewServer:
         }
 
     def _place(self, subject: str, expression: str, frame: str, package: str) -> dict[str, Any]:
-        heads = [] if self._source is None else [h for h in self._source.heads if h.subject == subject]
-        heads.sort(key=lambda head: (head.expression != NEUTRAL, head.expression))
-        wanted = next((head for head in heads if head.expression == expression), None)
-        if wanted is None:
-            raise UsageError(f"there is no {subject}/{expression}: list the heads again")
+        head = self._head(subject, expression)
+        return self._open_lane().package(head, self._prepared(subject, frame), Path(package))
+
+    def _thumbnail(
+        self, subject: str, expression: str, frame: str, pixels: int, cache: str
+    ) -> dict[str, Any]:
+        head = self._head(subject, expression)
+        try:
+            content = [file_sha256(file) for file in head.files]
+        except OSError as error:
+            raise HeadError(f"{head.name}: {error.filename}: {error.strerror}") from error
+        name = hashlib.sha256(json.dumps([content, frame, pixels]).encode()).hexdigest()[:32]
+        picture = Path(cache) / f"{name}.png"
+        if not picture.exists():
+            prepared = self._prepared(subject, frame)
+            package = self._scratch / "thumbnail.npz"
+            lane = self._open_lane()
+            lane.package(head, prepared, package)
+            config = load_config(None, {"render": {"resolution": pixels}})
+            distance = camera_distance(config, prepared)
+            zero = [[0.0, 0.0, 0.0]]
+            render = {"resolution": pixels}
+            made = lane.pictures(str(package), render, distance, zero, str(self._scratch), False)
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            half = picture.with_name(f".{os.getpid()}-{picture.name}")  # another Blender may write it too
+            shutil.copyfile(made["pictures"][0], half)
+            os.replace(half, picture)
+        return {"picture": str(picture)}
+
+    def _head(self, subject: str, expression: str) -> Head:
+        heads = () if self._source is None else self._source.heads
+        for head in heads:
+            if (head.subject, head.expression) == (subject, expression):
+                return head
+        raise UsageError(f"there is no {subject}/{expression}: list the heads again")
+
+    def _prepared(self, subject: str, frame: str) -> Prepared:
+        """Where a subject stands; found once."""
         key = (subject, frame)
         if key not in self._placed:
+            assert self._source is not None, "a head that was found has a source"
+            heads = [head for head in self._source.heads if head.subject == subject]
+            heads.sort(key=lambda head: (head.expression != NEUTRAL, head.expression))
             self._placed[key] = self._find(heads, frame)
-        return self._open_lane().package(wanted, self._placed[key], Path(package))
+        return self._placed[key]
 
     def _find(self, heads: list[Head], frame: str) -> Prepared:
         """As a build places a subject: by its neutral face, or the first that shows one."""
@@ -166,6 +214,13 @@ class PreviewServer:
             self._lane = _PreviewLane(self._options)
             self._stack.callback(self._lane.close)
         return self._lane
+
+
+def _draw_plan(poses: dict[str, Any], file: str) -> dict[str, Any]:
+    plan = load_config(None, {"poses": poses}).poses.plan()
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    np.save(file, plan.angles_deg)
+    return {"count": len(plan)}
 
 
 def draw_points(image: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -89,6 +89,8 @@ class Renderer:
         env = {"PYTHONPATH": path} if blender is None else {"PYTHONPATH": ""}
         # Nor another colour management, which studios set for all programs and Blender 5 for its children.
         env["OCIO"] = ""
+        # Blender's own temporary folder goes with ours, also when the worker is killed.
+        env |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(frames))
         self._process = LineProcess(worker_command(blender, threads), log, env)
         ready = self._process.receive(deadline_s)
         if "ready" not in ready:

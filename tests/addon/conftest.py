@@ -42,14 +42,7 @@ def extension_zip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def host_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """This Python, as seen from a Blender that may live in a file system of its own."""
     path = tmp_path_factory.mktemp("host") / "python"
-    path.write_text(
-        "#!/bin/sh\n"
-        f'set -- env PYTHONPATH="{ROOT}" "{sys.executable}" "$@"\n'
-        '[ -z "$HEADTURN_OUTSIDE" ] || set -- nsenter -t "$HEADTURN_OUTSIDE" -m -r --wdns="$PWD" "$@"\n'
-        'exec "$@"\n',
-        encoding="utf-8",
-    )
-    path.chmod(0o755)
+    subprocess.run([ROOT / "scripts" / "host_python.sh", sys.executable, path], check=True)
     return path
 
 

@@ -26,6 +26,16 @@ class RealBlender:
         """Run it to its end; returns what it said and its exit code."""
         return self._run([self.executable, *arguments], check, timeout, environment)
 
+    def start(self, *arguments: str) -> subprocess.Popen[str]:
+        """Run it beside the test."""
+        return subprocess.Popen(
+            [self.executable, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env={**os.environ, **self.environment},
+        )
+
     def run_with_window(self, *arguments: str, timeout: float = 560, **environment: str):
         """The same with a window of 1280 x 720."""
         flags = ["--enable-event-simulate", "--window-geometry", "0", "0", "1280", "720"]

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import ast
-import json
-import os
 import sys
 import time
 import zipfile
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from blender_addon.core.process import HostProcess
 from blender_addon.core.progress import Progress, duration
 from generator import __version__
 from generator.errors import UsageError, WorkerError
+from generator.execution.preview_server import PreviewServer
 from generator.plan.config import BuildConfig, load_config
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,6 +93,19 @@ def test_settings_that_no_panel_shows_are_kept() -> None:
     assert merged["render"]["resolution"] == 64 and "distance_mm" not in merged["render"]
 
 
+def test_digits_that_blender_cannot_hold_are_kept() -> None:
+    base = {"poses": {"yaw": [-33.3333333333, 50, 10]}, "render": {"margin": 1.1, "lens_mm": 85.0}}
+    shown = {"poses": {"yaw": [-33.33333, 50, 10]}, "render": {"lens_mm": 85}}
+    assert config.merged(base, shown) == base
+    assert config.merged(base, {"poses": {"yaw": [-33.3334, 50, 10]}})["poses"]["yaw"][0] == -33.3334
+
+
+def test_names_in_a_field_are_separated_by_commas() -> None:
+    assert config.split_names(' anna,  "Lee, Perry" ,3 ') == ["anna", "Lee, Perry", "3"]
+    assert config.split_names(config.join_names(["a", 'b "x", c'])) == ["a", 'b "x", c']
+    assert config.split_names(" , ") is None and config.join_names([]) == ""
+
+
 @pytest.mark.parametrize("text", ["[render", "[unknown]\na = 1", "render = 3"])
 def test_a_bad_configuration_is_refused_with_its_name(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.toml"
@@ -107,8 +120,30 @@ def test_the_timeline_is_the_plan_of_the_build() -> None:
     assert (plan.angles_deg == poses.plan().angles_deg).all() and len(plan) == 693
     assert grid.snapped(13.0, (-50, 50, 10)) == 10 and grid.snapped(99.0, (-50, 50, 10)) == 50
     assert len(set(grid.extremes(poses.model_dump()))) == 9
-    with pytest.raises(UsageError, match="Sobol"):
-        grid.plan_poses({**poses.model_dump(), "kind": "sobol"})
+    assert grid.extremes(poses.model_dump())[0] == (-50, 40, -30)
+
+
+def test_every_plan_of_the_build_is_on_the_timeline(tmp_path: Path) -> None:
+    values = BuildConfig().poses.model_dump() | {"yaw": [10, 50], "count": 9, "seed": 3}
+    table = tmp_path / "poses.csv"
+    table.write_text("yaw_deg,pitch_deg,roll_deg\n5,1,2\n-5,0,7\n", encoding="utf-8")
+    for kind in ("uniform", "sobol", "csv"):
+        poses = {**values, "kind": kind, "path": str(table)}
+        if kind == "sobol":  # takes SciPy, so the host draws it
+            with pytest.raises(grid.NotDrawn):
+                grid.plan_poses(poses)
+            answer = PreviewServer(tmp_path, ExitStack()).answer(
+                {"op": "plan", "poses": poses, "file": str(tmp_path / "p.npy")}
+            )
+            assert answer == {"count": 9}
+            grid.remember(poses, tmp_path / "p.npy")
+            with pytest.raises(grid.NotDrawn):
+                grid.plan_poses({**poses, "seed": 4})
+        planned = load_config(None, {"poses": poses}).poses.plan()
+        assert (grid.plan_poses(poses).angles_deg == planned.angles_deg).all()
+        assert (grid.plan_poses(poses).indices == planned.indices).all()
+    assert grid.extremes({**values, "kind": "csv", "path": str(table)})[:2] == [(-5, 1, 2), (0, 1, 2)]
+    assert {yaw for yaw, _, _ in grid.extremes({**values, "kind": "sobol"})} == {10, 50}
 
 
 def test_progress_adds_up_events() -> None:
@@ -179,23 +214,3 @@ def test_the_core_knows_no_blender() -> None:
         text = path.read_text(encoding="utf-8")
         assert text.startswith("# SPDX-License-Identifier: GPL-3.0-or-later\n"), path
         assert text.count("\n") <= 350, path
-
-
-def test_a_host_whose_blender_is_gone_ends(host_python: Path, tmp_path: Path) -> None:
-    """The reader of its pipe dies, as when Blender is killed: the build must not go on for ever."""
-    import subprocess
-
-    command = [str(host_python), "-m", "generator.cli", "build", "--json", "--workers", "1"]
-    command += ["--resolution", "64", "--count", "1", "--out", str(tmp_path / "d")]
-    environment = {**os.environ, "HEADTURN_OUTSIDE": ""}
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, text=True
-    )
-    assert process.stdout is not None
-    for line in process.stdout:
-        event = json.loads(line)
-        if event["event"] == "progress" and event["stage"] == "rendering":
-            break
-    process.stdout.close()
-    assert process.wait(timeout=60) != 0
-    assert not (tmp_path / "d" / "manifest.json").exists()

@@ -26,6 +26,7 @@ DEADLINE_S = 60.0
 Step = float | Callable[[], bool]
 
 MARK = (0.0, 1.0, 0.0)
+_BEGAN = time.monotonic()
 
 
 class Widget(NamedTuple):
@@ -75,17 +76,16 @@ def drive(script: Callable[[], Iterator[Step]]) -> None:
     bpy.app.timers.register(tick, first_interval=1.0)
 
 
-def shot(name: str) -> np.ndarray:
-    """Write OUT/name.png of the whole window; returns it as float [H, W, 3] from the top."""
+def shot(name: str, suffix: str = ".png") -> np.ndarray:
+    """Write the whole window to OUT; returns it as float [H, W, 3] from the top, 0-1."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-    path = OUT / f"{name}.png"
+    path = OUT / f"{name}{suffix}"
     subprocess.run(["import", "-window", "root", str(path)], check=True)
-    image = bpy.data.images.load(str(path))
-    width, height = image.size
-    pixels = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::-1, :, :3]
+    said = subprocess.run(["convert", str(path), "-depth", "8", "ppm:-"], check=True, capture_output=True)
+    _, size, _, pixels = said.stdout.split(b"\n", 3)
+    width, height = map(int, size.split())
+    print(f"{time.monotonic() - _BEGAN:6.1f} s  {name}", flush=True)
+    return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3) / 255.0
 
 
 def area(kind: str = "VIEW_3D") -> bpy.types.Area:
@@ -105,16 +105,16 @@ def view_pixels(image: np.ndarray) -> np.ndarray:
     return image[height - view.y - view.height : height - view.y, view.x : side.x]
 
 
-def widgets(kind: str) -> Iterator[Step]:
-    """The sidebar's "sliders" or "buttons" wider than a tenth of it, from the top.
+def widgets(kind: str, area_kind: str = "VIEW_3D", region_kind: str = "UI") -> Iterator[Step]:
+    """A region's "sliders" or "buttons" wider than a tenth of it, from the top; by default the sidebar's.
 
     To be used as ``found = yield from widgets("sliders")``. Blender does not say where
     a widget is, so for one picture they get a colour of their own.
     """
-    view = region("WINDOW")
-    # Away from the sidebar: a widget under the mouse is lighter.
-    event("MOUSEMOVE", "NOTHING", view.x + view.width // 4, view.y + view.height // 2)
-    yield 0.2
+    place = region(region_kind, area_kind)
+    # To the left of it: a widget under the mouse is lighter.
+    event("MOUSEMOVE", "NOTHING", max(place.x - 200, 2), place.y + place.height // 2)
+    yield 0.1
     theme = bpy.context.preferences.themes[0].user_interface
     looks = theme.wcol_numslider if kind == "sliders" else theme.wcol_tool
     names = ("inner", "inner_sel", "item", "outline", "text", "text_sel")
@@ -123,15 +123,15 @@ def widgets(kind: str) -> Iterator[Step]:
         length = len(getattr(looks, name))
         setattr(looks, name, ((0.0, 0.0, 0.0) if name == "outline" else MARK)[:3] + (1.0,) * (length - 3))
     looks.show_shaded = False
-    image = shot("widgets")
+    image = shot("widgets", ".ppm")
     for name, value in zip(names, before, strict=False):
         setattr(looks, name, value)
     looks.show_shaded = before[-1]
-    side = region("UI")
     height = bpy.context.window.height
     there = np.abs(image - np.array(MARK)).max(axis=2) < 0.1
-    there[:, : side.x] = there[:, side.x + side.width :] = False
-    rows = np.append(there.sum(axis=1) > side.width / 10, False)
+    there[:, : place.x] = there[:, place.x + place.width :] = False
+    there[: height - place.y - place.height] = there[height - place.y :] = False
+    rows = np.append(there.sum(axis=1) > place.width / 10, False)
     edges = np.flatnonzero(np.diff(rows.astype(int), prepend=0))
     found = []
     for first, end in edges.reshape(-1, 2):

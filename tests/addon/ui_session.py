@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,10 +41,24 @@ def session() -> Iterator[Step]:
     building = sys.modules[f"{EXTENSION}.building"]
     state = module.state
     own = bpy.context.scene
+    python = os.environ.pop("HEADTURN_PYTHON")
 
     yield from open_tab()
     area().spaces.active.overlay.show_cursor = False
     shot("01-empty")
+
+    # Build without an environment: how to install one. Then its name, and Check.
+    bpy.context.scene.headturn.out = str(OUT / "never")
+    yield from scroll(40)
+    yield from _click_tallest()
+    yield lambda: building.current.refused
+    assert "pip install 'headturn[build]'" in state.error, state.error
+    yield 0.3
+    shot("02-no-environment")
+    yield from key("ESC")  # closes the message
+    yield from scroll(-40)
+    yield from _check_button(python)
+    assert state.facts is not None and not state.host_error
 
     # The Load button, with a folder that does not exist: a message, no traceback.
     bpy.context.scene.headturn.source = "FOLDER"
@@ -54,7 +69,7 @@ def session() -> Iterator[Step]:
     yield lambda: bool(state.error)
     assert "/nowhere/heads" in state.error, state.error
     yield 0.3
-    shot("02-no-such-folder")
+    shot("04-no-such-folder")
 
     # Parametric heads, in a file that has a name.
     bpy.context.scene.headturn.source = "PARAMETRIC"
@@ -71,7 +86,7 @@ def session() -> Iterator[Step]:
     shown = bpy.context.scene.headturn
     assert shown.subject and shown.expression == "neutral"
     yield 0.5
-    before = view_pixels(shot("03-loaded"))
+    before = view_pixels(shot("05-loaded"))
     assert len(state.subjects()) == 2
 
     # A slider turns the head in the pixels and rebuilds nothing.
@@ -80,7 +95,7 @@ def session() -> Iterator[Step]:
     x, y = yaw.middle
     yield from drag(x, y, x + 60, y)
     assert shown.yaw > 5, shown.yaw
-    after = view_pixels(shot("04-slider"))
+    after = view_pixels(shot("06-slider"))
     changed = float((np.abs(after - before).max(axis=2) > 0.1).mean())
     assert changed > 0.05, f"{changed:.1%} of the view changed"
     assert (shown.head.data.as_pointer(), shown.head.data.materials[0].as_pointer()) == (mesh, material)
@@ -90,11 +105,16 @@ def session() -> Iterator[Step]:
     yield from type_value(*pitch.middle, "-12.5")
     assert shown.pitch == -12.5, shown.pitch
     turned = np.array(shown.head.matrix_world)
-    shot("05-typed")
+    shot("07-typed")
     yield from key("Z", ctrl=True)
+    yield lambda: bpy.context.scene.headturn.pitch == 0.0
     shown = bpy.context.scene.headturn
-    assert shown.pitch == 0.0 and shown.yaw > 5, (shown.yaw, shown.pitch)
+    assert shown.yaw > 5, shown.yaw
     assert np.abs(np.array(shown.head.matrix_world) - turned).max() > 0.05
+    yield from key("Z", ctrl=True, shift=True)
+    yield lambda: bpy.context.scene.headturn.pitch == -12.5
+    shown = bpy.context.scene.headturn
+    assert np.abs(np.array(shown.head.matrix_world) - turned).max() < 1e-6
 
     # Snapping.
     shown.snap = True
@@ -115,7 +135,7 @@ def session() -> Iterator[Step]:
     index = scene.frame_current - 1
     expected = (-50 + 10 * (index // 63), -40 + 10 * (index // 7 % 9), -30 + 10 * (index % 7))
     assert (shown.yaw, shown.pitch, shown.roll) == expected, (scene.frame_current, expected)
-    shot("06-timeline")
+    shot("08-timeline")
     shown.on_timeline = False
 
     # Landmarks of the pose that is shown, and the extremes.
@@ -124,28 +144,35 @@ def session() -> Iterator[Step]:
     yield lambda: state.landmarks is not None
     assert len(state.landmarks[1]) == 468
     yield 0.3
-    shot("07-landmarks")
+    shot("09-landmarks")
     shown.show_landmarks = False
     assert bpy.ops.headturn.preview_extremes() == {"FINISHED"}
     yield lambda: not module.is_busy()
     assert state.extremes, state.error
     yield from scroll(6)
     yield 0.5
-    shot("08-extremes")
+    shot("10-extremes")
     yield from scroll(-30)
     shown.viewport = "RENDERED"
-    yield 3.0
-    shot("09-as-rendered")
+    yield 1.5
+    shot("11-as-rendered")
     shown.viewport = "SOLID"
 
-    # The next subject.
+    # The next subject, from the pictures of all of them.
     first = shown.subject
-    bpy.ops.headturn.step_head(what="SUBJECT", by=1)
+    kept = sys.modules[f"{EXTENSION}.pictures"].kept
+    yield lambda: all(kept(f"head/{subject}/neutral") for subject in state.subjects())
+    load, *_ = yield from widgets("buttons")
+    yield from click(load.left + 28, load.bottom - 73)
+    yield 0.5
+    shot("12-gallery")
+    yield from key("ESC")
+    shown.gallery = "1"
     yield lambda: not module.is_busy()
     shown = bpy.context.scene.headturn
-    assert shown.subject != first and shown.head is not None and not state.error
-    yield 0.5
-    shot("10-next-head")
+    assert shown.subject != first and shown.gallery == "1" and not state.error
+    assert state.displayed == (shown.subject, "neutral")
+    yield 0.3
 
     # Build a tiny dataset with the button.
     for name in ("yaw", "pitch", "roll"):
@@ -160,7 +187,7 @@ def session() -> Iterator[Step]:
     assert building.current.exit_code == 0, building.current.headline()
     yield from scroll(40)
     assert area().spaces.active.region_3d.view_perspective == "CAMERA"
-    shot("11-built")
+    shot("13-built")
     facts["rows"] = building.current.progress.result["rows"]
 
     # A long one, ended with Esc: what is there stays, and the folder can be continued.
@@ -172,12 +199,20 @@ def session() -> Iterator[Step]:
     yield lambda: building.current.runs and building.current.progress.stage == "rendering"
     yield lambda: building.current.progress.done > 0
     yield from scroll(40)
-    shot("12-building")
+    shot("14-building")
     yield from key("ESC")
     yield lambda: not building.current.runs
     assert building.current.cancelled and building.current.exit_code not in (0, 3)
     yield from scroll(40)
-    shot("13-cancelled")
+    shot("15-cancelled")
+
+    # Build goes on where that ended; this time the Cancel button, in the same place.
+    yield from _click_tallest()
+    yield lambda: building.current.runs and building.current.progress.stage == "rendering"
+    yield from scroll(40)
+    yield from _click_tallest()
+    yield lambda: not building.current.runs
+    assert building.current.cancelled and not (OUT / "long" / "manifest.json").exists()
 
     # A folder that holds something else.
     (OUT / "foreign").mkdir()
@@ -188,18 +223,49 @@ def session() -> Iterator[Step]:
     yield lambda: building.current.exit_code is not None and not building.current.cancelled
     assert building.current.exit_code == 1 and "foreign" in building.current.headline()
     yield from scroll(40)
-    shot("14-refused")
+    shot("16-refused")
     assert "foreign" in bpy.data.texts["Headturn report"].as_string()
 
-    # Off and on again.
+    # Off and on again: the axes go and come back.
     import addon_utils
 
+    seen = _axis_pixels(shot("17-before"))
     addon_utils.disable(EXTENSION)
     assert not hasattr(bpy.types.Scene, "headturn")
+    yield 0.3
+    gone = _axis_pixels(shot("18-disabled"))
     addon_utils.enable(EXTENSION)
-    yield 0.5
-    shot("15-enabled-again")
+    yield 0.3
+    yield 0.3  # a redraw may take longer than that, and ours comes after it
+    back = _axis_pixels(shot("19-enabled-again"))
+    assert seen > 150 and gone < 10 and back > 0.9 * seen, (seen, gone, back)
     (OUT / "facts.json").write_text(json.dumps(facts), encoding="utf-8")
+
+
+def _check_button(python: str) -> Iterator[Step]:
+    """Name the environment in the preferences and press Check."""
+    state = sys.modules[f"{EXTENSION}.session"].state
+    preferences = bpy.context.preferences
+    view = area()
+    view.type = "PREFERENCES"
+    preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "Headturn"
+    bpy.ops.preferences.addon_expand(module=EXTENSION)
+    preferences.addons[EXTENSION].preferences.python = python
+    yield 0.5
+    buttons = yield from widgets("buttons", "PREFERENCES", "WINDOW")
+    yield from click(*buttons[0].middle)
+    yield lambda: state.facts is not None or state.host_error
+    yield 0.3
+    shot("03-checked")
+    view.type = "VIEW_3D"
+    yield 0.3
+
+
+def _axis_pixels(image: np.ndarray) -> int:
+    """How many pixels of the 3D view have the colour of the axis to the front."""
+    blue = np.array(sys.modules[f"{EXTENSION}.overlay"].BLUE[:3])
+    return int((np.abs(view_pixels(image) - blue).max(axis=2) < 0.06).sum())
 
 
 def _click_tallest() -> Iterator[Step]:

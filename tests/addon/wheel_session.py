@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs with the bpy wheel: the installed extension without a window. argv: extension zip, head package."""
+"""Runs with a bpy wheel: the installed extension without a window. argv: extension zip, head, folder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ R_B = """0.556670399 0.766044443 0.321393805 -0.829598373 0.492403877 0.26325835
 0.043412044 -0.413175911 0.909615886"""
 
 
-def main(package: str, head: str) -> None:
+def main(package: str, head: str, folder: str) -> None:
     addon_utils = importlib.import_module("addon_utils")  # there once bpy is
     bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
     for _ in range(2):
@@ -25,6 +25,11 @@ def main(package: str, head: str) -> None:
     studio = importlib.import_module(f"{NAME}.studio")
     settings = importlib.import_module(f"{NAME}.settings")
     own = bpy.context.scene
+    settings.save(own.headturn, Path(folder) / "saved-defaults.toml")
+    for file in sorted(Path(folder).glob("[fm]*.toml")):
+        settings.load(own.headturn, file)
+        settings.save(own.headturn, file.with_name(f"saved-{file.name}"))
+    settings.load(own.headturn, Path(folder) / "saved-defaults.toml")  # what a file leaves out is the default
     before = {name: len(getattr(bpy.data, name)) for name in ("meshes", "materials", "worlds", "cameras")}
     scene = studio.studio_scene()
     studio.show_package(scene, Path(head), 120.0)
@@ -54,17 +59,18 @@ def main(package: str, head: str) -> None:
     assert after == {name: before[name] + added[name] for name in before}, (before, after)
     assert studio.distance_mm(shown) == round(1.05 * 120 / np.sin(np.arctan(18 / 50)), 2)
 
-    # A configuration that does not fit changes nothing.
-    bad = Path(head).with_name("bad.toml")
-    bad.write_text('[render]\nresolution = "large"\n', encoding="utf-8")
+    # A configuration that does not fit changes nothing; Blender would take the last one and cut it off.
+    bad = Path(folder) / "bad.toml"
     config = settings.to_config(shown)
-    try:
-        settings.load(shown, bad)
-    except Exception as error:
-        assert "bad.toml" in str(error), error
-    else:
-        raise AssertionError("a resolution that is no number was taken")
-    assert settings.to_config(shown) == config
+    for text in ('resolution = "large"', "resolution = 1e400", "lens_mm = nan", "resolution = 8000"):
+        bad.write_text(f"[render]\n{text}\n", encoding="utf-8")
+        try:
+            settings.load(shown, bad)
+        except Exception as error:
+            assert "bad.toml" in str(error), error
+        else:
+            raise AssertionError(f"{text} was taken")
+        assert settings.to_config(shown) == config, text
     print("passed", bpy.app.version_string)
 
 

@@ -265,3 +265,15 @@ def test_fbx_is_read_by_blender(renderer: Renderer, placed_head: PlacedHead, tmp
     assert any(m.texture for m in mesh.materials)
     shape = np.ptp(original.vertices, axis=0) / np.ptp(mesh.vertices, axis=0)
     assert shape.std() / shape.mean() < 1e-3, "axes and proportions survive"
+
+
+def test_a_killed_worker_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender's temporary folder lies in ours, which the next build clears away."""
+    elsewhere, ours = tmp_path / "elsewhere", tmp_path / "ours"
+    elsewhere.mkdir()
+    ours.mkdir()
+    monkeypatch.setenv("TMPDIR", str(elsewhere))
+    worker = Renderer(ours, ours / "render.log")
+    assert list(ours.glob("blender_*"))
+    worker.kill()
+    assert not list(elsewhere.iterdir())

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Messages of several lines: Blender's labels do not wrap."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+WIDTH_PER_CHARACTER = 7.2
+"""Pixels at a UI scale of 1."""
+
+
+def message(
+    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str, *, margin: int = 6
+) -> None:
+    """A label of as many lines as the region's width needs; nothing is cut off. margin: characters."""
+    scale = context.preferences.system.ui_scale
+    characters = max(16, int(context.region.width / scale / WIDTH_PER_CHARACTER) - margin)
+    column = layout.column(align=True)
+    for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs in a background Blender with the extension: what goes wrong is said, and nothing is lost.
+
+argv after --: the folder that test_bad_input.py has laid out.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+
+EXTENSION = "bl_ext.user_default.headturn"
+session = import_module(f"{EXTENSION}.session")
+building = import_module(f"{EXTENSION}.building")
+pictures = import_module(f"{EXTENSION}.pictures")
+
+
+def until(true: Callable[[], object]) -> None:
+    """Without a window nobody runs timers: do what they would do."""
+    deadline = time.monotonic() + 90
+    while not true():
+        assert time.monotonic() < deadline, (session.state, building.current)
+        session._tick()
+        building.current.poll()
+        time.sleep(0.05)
+
+
+def load(folder: Path) -> str:
+    """Press Load Heads; what the panel then says is wrong."""
+    shown = bpy.context.scene.headturn
+    shown.source, shown.folder = "FOLDER", str(folder)
+    assert bpy.ops.headturn.load_heads() == {"FINISHED"}
+    until(lambda: not session.is_busy())
+    return session.state.error
+
+
+def build(out: Path) -> str:
+    """Press Build; what the panel then says."""
+    scene = bpy.context.scene
+    scene.headturn.out = str(out)
+    building.current.forget()
+    session.with_host(lambda: building.current.start(scene))
+    until(lambda: building.current.exit_code is not None)
+    return building.current.headline()
+
+
+def main(folder: Path) -> None:
+    python = os.environ.pop("HEADTURN_PYTHON")
+    said = load(folder / "facescape")
+    assert "pip install 'headturn[build]'" in said, said
+    os.environ["HEADTURN_PYTHON"] = python
+
+    said = load(folder / "models-missing")
+    assert f"no heads in {folder / 'models-missing'}" in said, said
+    said = load(folder / "texture-missing")
+    assert said.startswith("facescape-2/neutral: the texture '1_neutral.jpg' is missing"), said
+
+    # A head is left out with its reason, the others are shown, each with its picture.
+    assert load(folder / "facescape") == ""
+    shown = bpy.context.scene.headturn
+    state = session.state
+    assert [reason.split(" is missing")[0] for reason in state.skipped] == [
+        "facescape-2/neutral: the texture '1_neutral.jpg'"
+    ]
+    assert state.displayed == ("facescape-1", "neutral") and len(shown.head.data.vertices) > 1000
+    until(lambda: all(pictures.kept(f"head/{a}/{b}") for a, b in state.heads))
+    assert len(state.heads) == 2
+    made = list(Path(bpy.utils.extension_path_user(EXTENSION, path="thumbnails")).glob("*.png"))
+    assert len(made) == 1, "subjects 1 and 3 are the same files: one picture serves both"
+
+    # Sobol poses come from the host.
+    shown.plan, shown.pose_count, shown.on_timeline = "sobol", 16, True
+    until(lambda: bpy.context.scene.frame_end == 16)
+    bpy.context.scene.frame_set(5)
+    pose = shown.yaw
+    bpy.context.scene.frame_set(6)
+    assert shown.yaw != pose
+    shown.plan, shown.on_timeline = "grid", False
+
+    # The folder vanishes while it is open.
+    shutil.rmtree(folder / "facescape")
+    vertices = len(shown.head.data.vertices)
+    bpy.ops.headturn.step_head(what="SUBJECT", by=1)
+    until(lambda: not session.is_busy())
+    assert str(folder / "facescape") in state.error, state.error
+    assert state.displayed == ("facescape-1", "neutral") and len(shown.head.data.vertices) == vertices
+    said = build(folder / "never")
+    assert building.current.exit_code == 2 and "no such file or folder" in said, said
+    report = bpy.data.texts["Headturn report"].as_string()
+    assert report.splitlines()[1].startswith("wrong use (exit code 2): no such file"), report
+
+    # Another Blender builds into that folder.
+    shown.source, shown.count = "PARAMETRIC", 1
+    said = build(folder / "held")
+    assert building.current.exit_code == 1 and "another build (process " in said, said
+    print("passed")
+
+
+main(Path(sys.argv[sys.argv.index("--") + 1]))

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs in a background Blender with the extension: builds for hours into the folder after --."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+
+out = Path(sys.argv[sys.argv.index("--") + 1])
+session = import_module("bl_ext.user_default.headturn.session")
+build = import_module("bl_ext.user_default.headturn.building").current
+shown = bpy.context.scene.headturn
+shown.count, shown.resolution, shown.workers, shown.out = 1, 64, 1, str(out)
+shown.yaw_range = shown.pitch_range = (-40, 40, 1)
+session.with_host(lambda: build.start(bpy.context.scene))
+marked = False
+while build.exit_code is None:
+    session._tick()
+    build.poll()
+    if build.runs and build.progress.stage == "rendering" and build.progress.done > 0 and not marked:
+        marked = True
+        pids = {"blender": os.getpid(), "host": build.process.pid}
+        out.with_suffix(".json").write_text(json.dumps(pids), encoding="utf-8")
+    time.sleep(0.05)
+print(build.headline(), build.process)
