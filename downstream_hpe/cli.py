@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
 """The ``downstream-hpe`` command.
 
-Exit codes: 0 done, 1 failed, 2 wrong use.
+Exit codes: 0 done, 1 failed, 2 wrong use, 3 finished with something left out, 130 stopped.
 """
 
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import sys
+import time
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -55,6 +55,7 @@ class LayoutName(str, Enum):
     headturn = "headturn"
     aflw2000 = "aflw2000"
     biwi = "biwi"
+    biwi_colour = "biwi-colour"
     biwi_npz = "biwi-npz"
 
 
@@ -72,6 +73,10 @@ def fit(
     holes: Annotated[
         HolesName, typer.Option(help="Cells without a detected face: refuse, mask, exact or rotate.")
     ] = HolesName.refuse,
+    extra: Annotated[
+        list[Path] | None,
+        typer.Option(help="A further dataset, at any poses, for the networks alone; repeatable."),
+    ] = None,
     recipe: Annotated[
         RecipeName, typer.Option(help="continuous: this program's. paper: the paper's.")
     ] = RecipeName.continuous,
@@ -99,6 +104,7 @@ def fit(
 
     settings = FitSettings(
         recipe=recipe.value,
+        extra=tuple(map(str, extra or ())),
         ranks=_ranks(ranks),
         holes=holes.value,
         normalisation=normalisation.value,
@@ -126,7 +132,7 @@ def fit(
 
 @app.command(epilog="Example: downstream-hpe evaluate model other_heads --out report")
 def evaluate(
-    model: Annotated[Path, typer.Argument(help="A model folder of downstream-hpe fit.")],
+    model: Annotated[str, typer.Argument(help="A model folder, an .onnx file, or the name of a model.")],
     dataset: Annotated[Path, typer.Argument(help="A dataset; subjects the model has seen are left out.")],
     layout: Annotated[
         LayoutName, typer.Option("--format", help="headturn, or labelled photographs; these need mediapipe.")
@@ -143,84 +149,111 @@ def evaluate(
 ) -> None:
     """Errors of the model beside its baselines, per angle and per interval."""
     from downstream_hpe import evaluation as ev
-    from downstream_hpe.fitting import compare, estimators, summary, unseen_rows
-    from downstream_hpe.photographs import FORMATS, detected_rows
+    from downstream_hpe import measuring, misses
+    from downstream_hpe.confidence import reliability
+    from downstream_hpe.fitting import compare, summary
     from downstream_hpe.predictor import Predictor
     from downstream_hpe.reference import load_reference
 
+    predictor = Predictor.load(model)
     face = None if reference is None else load_reference(reference)
-    every = estimators(model, face)
+    every = measuring.model_estimators(model, predictor, face)
     if layout is LayoutName.headturn:
-        rows = unseen_rows(model, dataset, split)
+        measured = measuring.dataset_rows(predictor, dataset, split, _note)
     else:
-        predictor = Predictor.load(model)
-        rows = detected_rows(FORMATS[layout.value](dataset), predictor.landmarks)
+        measured = measuring.photograph_rows(predictor, dataset, layout.value, _note)
         predictor.close()
-    if rows.undetected:
-        _note(f"no face found in {rows.undetected} of {rows.undetected + len(rows)} pictures")
     if bounded:
-        inside = ev.within_bounds(rows.ypr_deg)
-        if not inside.any():
-            raise DataError(f"{dataset}: no pose within 50, 40, 30 degrees; use --all")
-        if not inside.all():
-            _note(f"{int((~inside).sum())} rows outside 50, 40, 30 degrees left out")
-        rows = rows.take(inside)
+        measured = measuring.bounded(measured, dataset, _note)
+    rows, missed = measured.rows, misses.misses(measured.rows.ypr_deg, measured.missed_deg)
+    undetected = len(measured.missed_deg)
+    if undetected:
+        _note(f"no face found in {undetected} of {undetected + len(rows)} rows; they are not in the errors")
     found = compare(rows, every)
+    tables = [ev.markdown(found)]
+    said = predictor.from_landmarks(rows.landmarks).confidence
+    if said is not None:
+        tables.append(reliability(said, found[-1].geodesic_errors))
+    if any(m.missed for m in missed):
+        tables.append(misses.markdown(missed))
     if report is not None:
         report.mkdir(parents=True, exist_ok=True)
-        (report / "errors.md").write_text(ev.markdown(found), encoding="utf-8")
+        (report / "errors.md").write_text("\n".join(tables), encoding="utf-8")
         ev.write_csv(found, report / "errors.csv")
+        misses.write_csv(missed, report / "misses.csv")
         ev.plot_intervals(found, report / "error_by_interval.png")
         ev.plot_distribution(found, report / "error_distribution.png")
         _note(f"tables and plots: {report}")
-    typer.echo(json.dumps([summary(e) for e in found]) if as_json else ev.markdown(found))
+    if as_json:
+        typer.echo(json.dumps([{**summary(e), "undetected": undetected} for e in found]))
+    else:
+        typer.echo("\n".join(tables))
 
 
-@app.command(epilog="Example: downstream-hpe predict photo.jpg --model model --draw drawn")
+@app.command(epilog="Example: downstream-hpe predict photo.jpg --draw drawn")
 def predict(
-    inputs: Annotated[list[str], typer.Argument(help="Pictures, folders of them, videos, webcam:0.")],
-    model: Annotated[Path, typer.Option(help="A model folder, or an exported .onnx file.")],
-    table: Annotated[Path | None, typer.Option("--out", help="Write a .csv file.")] = None,
+    inputs: Annotated[list[str], typer.Argument(help="Pictures, videos, folders of them, webcam:0.")],
+    model: Annotated[
+        str, typer.Option(help="The name of a model, a model folder, or an .onnx file.")
+    ] = "headturn",
+    table: Annotated[Path | None, typer.Option("--out", help="Write a .csv or .parquet file.")] = None,
     drawn: Annotated[
-        Path | None, typer.Option("--draw", help="Folder for pictures and videos with the axes.")
+        Path | None, typer.Option("--draw", help="Folder for pictures and videos with axes and angles.")
     ] = None,
+    faces: Annotated[int, typer.Option(min=1, help="At most so many faces a picture or frame.")] = 1,
     smooth: Annotated[bool, typer.Option(help="One-euro filter on video.")] = False,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop a video after so many frames.")] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Head pose of the most prominent face of each picture or frame."""
-    from downstream_hpe.predicting import COLUMNS, predictions, sources
+    """Head pose of the faces in pictures, videos and webcams; Ctrl-C ends a webcam."""
+    from downstream_hpe.inputs import find_sources
+    from downstream_hpe.predicting import Options, predictions
     from downstream_hpe.predictor import Predictor
+    from downstream_hpe.records import RecordWriter, text
 
-    every = sources(inputs)
+    left_out: list[str] = []
+
+    def leave_out(line: str) -> None:
+        left_out.append(line)
+        if alone and not images:
+            raise DataError(line)
+        _note(line)
+
+    alone, images, with_face = False, 0, 0
+    every = find_sources(inputs, drawn, leave_out)
+    alone = len(every) == 1
     predictor = Predictor.load(model)
-    found = count = 0
+    options = Options(faces, drawn, smooth, frames)
+    last, stopped = None, False
+    began = ended = 0.0
     with contextlib.ExitStack() as stack:
         stack.callback(predictor.close)
-        writer = None
-        if table is not None:
-            stream = stack.enter_context(table.open("w", newline="", encoding="utf-8"))
-            writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
-            writer.writeheader()
-        for record in predictions(every, predictor, drawn, smooth=smooth, frames=frames):
-            count += 1
-            found += record["found"]
-            if writer is not None:
-                writer.writerow(record)
-            if as_json:
-                typer.echo(json.dumps(record))
-            else:
-                typer.echo(_pose_line(record))
-    if not found:
-        raise DataError(f"no face found in {count} pictures")
-
-
-def _pose_line(record: dict[str, Any]) -> str:
-    where = record["input"] + (f" {record['time_s']:.2f} s" if record["frame"] is not None else "")
-    if not record["found"]:
-        return f"{where}: no face found"
-    angles = (f"{name} {record[f'{name}_deg']:.1f}" for name in ("yaw", "pitch", "roll"))
-    return f"{where}: {', '.join(angles)}"
+        writer = None if table is None else stack.enter_context(RecordWriter(table))
+        rows = stack.enter_context(contextlib.closing(predictions(every, predictor, options, leave_out)))
+        try:
+            for row in rows:
+                if (row["input"], row["frame"]) != last:
+                    images += 1
+                    with_face += row["found"]
+                    ended = time.monotonic()
+                    began = began or ended
+                    last = (row["input"], row["frame"])
+                if writer is not None:
+                    writer.add(row)
+                typer.echo(json.dumps(row) if as_json else text(row))
+        except KeyboardInterrupt:
+            stopped = True
+    # From the first to the last, without the start of the detector.
+    rate = f", {(images - 1) / (ended - began):.1f} a second" if images > 1 else ""
+    _note(f"a face in {with_face} of {images} pictures and frames{rate}")
+    if stopped and not any(isinstance(source.path, int) for source in every):
+        raise typer.Exit(130)
+    if not images:
+        raise DataError(f"nothing could be read of {len(every)} inputs")
+    if not with_face:
+        raise DataError("no face found")
+    if left_out:
+        raise typer.Exit(3)
 
 
 @app.command(epilog="Example: downstream-hpe export model --onnx pose.onnx --weights pose.safetensors")
@@ -228,6 +261,7 @@ def export(
     model: Annotated[Path, typer.Argument(help="A model folder of downstream-hpe fit.")],
     onnx: Annotated[Path | None, typer.Option(help="The graph from raw landmarks to pose.")] = None,
     weights: Annotated[Path | None, typer.Option(help="The network's weights, safetensors.")] = None,
+    as_json: JsonFlag = False,
 ) -> None:
     """Write a trained model as files that need nothing of this program."""
     from downstream_hpe.export import export_onnx
@@ -237,12 +271,16 @@ def export(
     if onnx is None and weights is None:
         raise UsageError("nothing to write; give --onnx FILE, --weights FILE or both")
     trained = Weights.load(model / NETWORK_FILE)
-    if onnx is not None:
-        export_onnx(trained, onnx)
-        typer.echo(f"{onnx}: {onnx.stat().st_size / 1e6:.1f} MB")
-    if weights is not None:
-        trained.save(weights)
-        typer.echo(f"{weights}: {weights.stat().st_size / 1e6:.1f} MB")
+    written: list[Path] = []
+    for path, write in ((onnx, lambda file: export_onnx(trained, file)), (weights, trained.save)):
+        if path is not None:
+            write(path)
+            written.append(path)
+    if as_json:
+        typer.echo(json.dumps([{"file": str(path), "bytes": path.stat().st_size} for path in written]))
+        return
+    for path in written:
+        typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
 
 def _ranks(text: str) -> tuple[int, int, int, int]:
@@ -286,6 +324,9 @@ def _one_line_errors() -> Iterator[None]:
         if error.name not in ("torch", "onnx", "onnxruntime", "safetensors"):
             raise
         _note(f"downstream-hpe: {error.name} is not installed: pip install 'headturn[hpe]'")
+        sys.exit(1)
+    except OSError as error:
+        _note(f"downstream-hpe: {error}")
         sys.exit(1)
     except KeyboardInterrupt:
         _note("downstream-hpe: stopped; run the same command again to continue")

@@ -8,15 +8,16 @@ model.onnx (raw landmarks to pose), model.json (settings, data, results) and man
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from downstream_hpe.confidence import Confidence, calibrate, level_faces
 from downstream_hpe.decomposition import PAPER_RANKS, Ranks, decompose
-from downstream_hpe.errors import DataError, ModelError
+from downstream_hpe.errors import UsageError
 from downstream_hpe.evaluation import (
     ANGLES,
     Estimator,
@@ -25,14 +26,19 @@ from downstream_hpe.evaluation import (
     evaluate,
     rigid_fit,
     split_subjects,
+    within_bounds,
 )
 from downstream_hpe.manifold import plot_manifolds
 from downstream_hpe.model import Progress, TensorModel
-from downstream_hpe.normalise import Normalisation
+from downstream_hpe.normalise import Normalisation, normalise
 from downstream_hpe.predictor import MODEL_FILE, Predictor
 from downstream_hpe.reference import mean_face
+from downstream_hpe.rotation import rotation_from_angles
 from downstream_hpe.tables import Rows, read_rows, subjects_by_split
 from downstream_hpe.tensor import Holes, open_tensor
+
+if TYPE_CHECKING:
+    from downstream_hpe.networks import Weights
 
 TENSOR_FILE = "tensor.safetensors"
 NETWORK_FILE = "network.safetensors"
@@ -42,10 +48,12 @@ PLOT_FILE = "manifolds.png"
 
 @dataclass(frozen=True)
 class FitSettings:
-    """recipe: "continuous" or "paper". validation: share of subjects held out where the dataset has
-    no validation split of its own; 0: none."""
+    """recipe: "continuous" or "paper". extra: further datasets, at any poses, that only the networks
+    learn from. validation: share of subjects held out where no dataset has a validation split of its
+    own; 0: none, and then there is no confidence either."""
 
     recipe: str = "continuous"
+    extra: tuple[str, ...] = ()
     ranks: Ranks = PAPER_RANKS
     holes: Holes = "refuse"
     normalisation: Normalisation = "rms"
@@ -89,7 +97,49 @@ def fit(
     from downstream_hpe.training import recipe_named, train
 
     recipe = recipe_named(settings.recipe, settings.epochs, settings.seed)
-    trained, held_out = _subjects(dataset, settings)
+    if settings.extra and not recipe.continuous:
+        raise UsageError("the paper's recipe learns from a grid alone; leave out --extra or its recipe")
+    every = [dataset, *map(Path, settings.extra)]
+    trained, held_out = _subjects(every, settings)
+    rows = Rows.joined([read_rows(path) for path in every])
+    mine, theirs = (rows.take(np.isin(rows.subjects, sorted(some))) for some in (trained, held_out))
+    folder.mkdir(parents=True, exist_ok=True)
+    model, card = _tensor_model(dataset, trained, mean_face(mine), settings, folder, note)
+    note(f"{len(mine)} faces of {len(trained)} subjects; held out: {len(theirs)} of {len(held_out)}")
+
+    torch.set_num_threads(settings.threads)
+    network = train(mine, model, recipe, folder, progress)
+    ranges = model.manifolds.range_deg
+    weights = Weights(network, settings.normalisation, ranges, None, tuple(sorted(trained)))
+    if len(theirs):
+        weights = replace(weights, confidence=_confidence(weights, mine, theirs))
+    weights.save(folder / NETWORK_FILE)
+    export_onnx(weights, folder / MODEL_FILE)
+    card |= {
+        "settings": asdict(settings),
+        "recipe": asdict(recipe),
+        "trained_subjects": sorted(trained),
+        "held_out_subjects": sorted(held_out),
+        "rows": len(mine),
+        "range_deg": ranges.tolist(),
+    }
+    inside = theirs.take(within_bounds(theirs.ypr_deg))
+    evaluations = compare(inside, estimators(folder)) if len(inside) else []
+    if evaluations:
+        card["held_out"] = [summary(e) for e in evaluations]
+    (folder / CARD_FILE).write_text(json.dumps(card, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    return Fitted(card, evaluations)
+
+
+def _tensor_model(
+    dataset: Path,
+    trained: set[str],
+    reference: np.ndarray,
+    settings: FitSettings,
+    folder: Path,
+    note: Callable[[str], None],
+) -> tuple[TensorModel, dict[str, Any]]:
+    """Decomposition and manifolds of the grid, written to the folder; and their part of the card."""
     tensor = open_tensor(
         dataset,
         holes=settings.holes,
@@ -103,45 +153,34 @@ def fit(
         if number % 5 == 0:
             note(f"missing cells, round {number}: relative error {error:.5f}")
 
-    decomposition = decompose(tensor, settings.ranks, refinements=settings.refinements, progress=round_done)
+    fit = decompose(tensor, settings.ranks, refinements=settings.refinements, progress=round_done)
     shares = ", ".join(
         f"{angle} {energies[: settings.ranks[k]].sum():.2%}"
-        for k, (angle, energies) in enumerate(zip(ANGLES, decomposition.energies[1:], strict=True), start=1)
+        for k, (angle, energies) in enumerate(zip(ANGLES, fit.energies[1:], strict=True), start=1)
     )
-    note(f"relative error {decomposition.relative_error:.4f}; energy kept: {shares}")
-    rows = read_rows(dataset)
-    mine = np.isin(rows.subjects, sorted(trained))
-    model = TensorModel.of(decomposition, tensor.axes_deg, mean_face(rows.take(mine)), settings.normalisation)
-    folder.mkdir(parents=True, exist_ok=True)
+    note(f"relative error {fit.relative_error:.4f}; energy kept: {shares}")
+    model = TensorModel.of(fit, tensor.axes_deg, reference, settings.normalisation)
     model.save(folder / TENSOR_FILE)
-    plot_manifolds(decomposition, model.manifolds, tensor.axes_deg, folder / PLOT_FILE)
+    plot_manifolds(fit, model.manifolds, tensor.axes_deg, folder / PLOT_FILE)
     note(f"manifolds: {folder / PLOT_FILE}")
-
-    torch.set_num_threads(settings.threads)
-    network = train(rows.take(mine), model, recipe, folder, progress)
-    card: dict[str, Any] = {
-        "settings": asdict(settings),
-        "recipe": asdict(recipe),
-        "trained_subjects": sorted(trained),
-        "held_out_subjects": sorted(held_out),
-        "rows": int(mine.sum()),
+    energies = zip(("identity", *ANGLES), fit.energies, strict=True)
+    return model, {
         "cells_without_landmarks": len(tensor.report.cells),
-        "relative_error": decomposition.relative_error,
-        "energies": {
-            a: e[:6].tolist() for a, e in zip(("identity", *ANGLES), decomposition.energies, strict=True)
-        },
-        "range_deg": model.manifolds.range_deg.tolist(),
+        "relative_error": fit.relative_error,
+        "energies": {axis: values[:6].tolist() for axis, values in energies},
     }
-    weights = Weights(network, settings.normalisation, model.manifolds.range_deg)
-    weights.save(folder / NETWORK_FILE)
-    export_onnx(weights, folder / MODEL_FILE)
-    evaluations: list[Evaluation] = []
-    theirs = np.isin(rows.subjects, sorted(held_out))
-    if theirs.any():
-        evaluations = compare(rows.take(theirs), estimators(folder))
-        card["held_out"] = [summary(e) for e in evaluations]
-    (folder / CARD_FILE).write_text(json.dumps(card, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    return Fitted(card, evaluations)
+
+
+def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:
+    """Calibrated on the faces held out, at all their poses."""
+    import torch
+
+    features = normalise(theirs.landmarks, weights.normalisation).reshape(len(theirs), -1)
+    with torch.no_grad():
+        ypr_deg = weights.network(torch.from_numpy(features.astype(np.float32))).numpy().astype(np.float64)
+    rotation = rotation_from_angles(ypr_deg)
+    faces = level_faces(mine.landmarks, mine.rotation, weights.normalisation)
+    return calibrate(faces, weights.range_deg, features, ypr_deg, rotation, theirs.rotation)
 
 
 def estimators(folder: Path, reference: np.ndarray | None = None) -> dict[str, Estimator]:
@@ -166,27 +205,6 @@ def compare(rows: Rows, every: dict[str, Estimator]) -> list[Evaluation]:
     return [evaluate(name, estimate(rows.landmarks), rows.rotation) for name, estimate in every.items()]
 
 
-def unseen_rows(folder: Path, dataset: Path, split: str | None) -> Rows:
-    """Rows of a dataset whose subjects the model was not trained on.
-
-    Raises
-    ------
-    ModelError: no card in the folder. DataError: no such rows.
-    """
-    file = folder / CARD_FILE
-    try:
-        trained = json.loads(file.read_text(encoding="utf-8"))["trained_subjects"]
-    except (OSError, json.JSONDecodeError, KeyError) as error:
-        raise ModelError(
-            f"{file}: not the card of a model; expected a folder of downstream-hpe fit"
-        ) from error
-    rows = read_rows(dataset, split)
-    unseen = ~np.isin(rows.subjects, trained)
-    if not unseen.any():
-        raise DataError(f"{dataset}: the model was trained on every subject in it; give other heads")
-    return rows.take(unseen)
-
-
 def summary(e: Evaluation) -> dict[str, Any]:
     """The overall numbers of one estimator."""
     mae = dict(zip(ANGLES, e.mae, strict=True))
@@ -200,9 +218,12 @@ def summary(e: Evaluation) -> dict[str, Any]:
     }
 
 
-def _subjects(dataset: Path, settings: FitSettings) -> tuple[set[str], set[str]]:
-    """Subjects to train on, and those held out."""
-    splits = subjects_by_split(dataset)
+def _subjects(datasets: Sequence[Path], settings: FitSettings) -> tuple[set[str], set[str]]:
+    """Subjects to train on, and those held out, whichever datasets they are in."""
+    splits: dict[str, set[str]] = {}
+    for path in datasets:
+        for split, subjects in subjects_by_split(path).items():
+            splits.setdefault(split, set()).update(subjects)
     every = set().union(*splits.values())
     if "validation" in splits:
         held = splits["validation"]

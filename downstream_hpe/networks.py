@@ -7,18 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from torch import nn
 
+from downstream_hpe.confidence import Confidence
 from downstream_hpe.errors import ModelError
 from downstream_hpe.model import packed, read_safetensors
-from downstream_hpe.normalise import NORMALISATIONS, Normalisation
+from downstream_hpe.normalise import FEATURES, NORMALISATIONS, Normalisation
 
 PAPER_LAYERS = (1404, 1024, 512, 256, 128, 64, 9)
 HEAD_LAYERS = (3, 128, 256, 128, 64, 1)
-FORMAT = "downstream-hpe network 1"
+FORMAT = "downstream-hpe network 2"
+_CONFIDENCE = "confidence."
 
 
 def multilayer(widths: Sequence[int], last: type[nn.Module]) -> nn.Sequential:
@@ -34,22 +37,27 @@ def multilayer(widths: Sequence[int], last: type[nn.Module]) -> nn.Sequential:
 class PoseNetwork(nn.Module):
     """The paper's network: encoder 1404-1024-512-256-128-64-9 and three heads 3-128-256-128-64-1.
 
-    layers: widths of the encoder, from 1404 to 9. scale_deg: what one unit of a head's output is,
-    in degrees, a float an angle.
+    layers: widths of the encoder, to 9. head_layers: of a head, from 3 to 1. scale_deg: what
+    one unit of a head's output is, in degrees, a float an angle.
     """
 
     scale_deg: torch.Tensor
 
     def __init__(
-        self, layers: Sequence[int] = PAPER_LAYERS, scale_deg: Sequence[float] = (50, 40, 30)
+        self,
+        layers: Sequence[int] = PAPER_LAYERS,
+        head_layers: Sequence[int] = HEAD_LAYERS,
+        scale_deg: Sequence[float] = (50, 40, 30),
     ) -> None:
         super().__init__()
-        if len(layers) < 2 or layers[0] != PAPER_LAYERS[0] or layers[-1] != PAPER_LAYERS[-1]:
-            raise ValueError(
-                f"expected layers from {PAPER_LAYERS[0]} to {PAPER_LAYERS[-1]}, got {tuple(layers)}"
-            )
+        if min(len(layers), len(head_layers)) < 2 or (layers[-1], head_layers[0], head_layers[-1]) != (
+            9,
+            3,
+            1,
+        ):
+            raise ValueError(f"expected layers to 9 and heads from 3 to 1, got {layers} and {head_layers}")
         self.encoder = multilayer(layers, nn.Tanh)
-        self.heads = nn.ModuleList(multilayer(HEAD_LAYERS, nn.ReLU) for _ in range(3))
+        self.heads = nn.ModuleList(multilayer(head_layers, nn.ReLU) for _ in range(3))
         self.register_buffer("scale_deg", torch.tensor(scale_deg, dtype=torch.float32))
 
     def angles(self, factors: torch.Tensor) -> torch.Tensor:
@@ -75,39 +83,59 @@ def rotation_of(ypr_deg: torch.Tensor) -> torch.Tensor:
     return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
 
 
+def widths(layers: nn.Module) -> list[int]:
+    """Widths of a chain of linear layers, from its input to its output."""
+    linear = [layer for layer in layers.children() if isinstance(layer, nn.Linear)]
+    return [linear[0].in_features, *(layer.out_features for layer in linear)]
+
+
 @dataclass(frozen=True)
 class Weights:
-    """A network and what its graph needs beside it. range_deg: float [3, 2], the angles trained on."""
+    """A network and what its graph needs beside it.
+
+    range_deg: float [3, 2], the angles trained on. confidence: None where no face was held out to
+    calibrate it. trained_subjects: whom the network has seen, so that nobody tests on them.
+    """
 
     network: PoseNetwork
     normalisation: Normalisation
     range_deg: np.ndarray
+    confidence: Confidence | None = None
+    trained_subjects: tuple[str, ...] = ()
 
     def save(self, path: Path) -> None:
         """One safetensors file."""
         from safetensors.torch import save_file
 
-        widths = [layer.in_features for layer in self.network.encoder if isinstance(layer, nn.Linear)]
         facts = {
-            "layers": [*widths, PAPER_LAYERS[-1]],
+            "layers": widths(self.network.encoder),
+            "head_layers": widths(self.network.heads[0]),
             "normalisation": self.normalisation,
             "range_deg": self.range_deg.tolist(),
+            "trained_subjects": list(self.trained_subjects),
         }
         tensors = {name: value.contiguous() for name, value in self.network.state_dict().items()}
+        if self.confidence is not None:
+            for name, array in vars(self.confidence).items():
+                tensors[_CONFIDENCE + name] = torch.tensor(array, dtype=torch.float64)
         save_file(tensors, path, metadata=packed(FORMAT, facts))
 
     @staticmethod
     def load(path: Path) -> Weights:
         """Raises ModelError where the file is not one that :meth:`save` wrote."""
         arrays, facts = read_safetensors(path, FORMAT)
+        beside = {name: arrays.pop(name) for name in list(arrays) if name.startswith(_CONFIDENCE)}
         try:
-            network = PoseNetwork(facts["layers"])
+            network = PoseNetwork(facts["layers"], facts["head_layers"])
+            if facts["layers"][0] != FEATURES:
+                raise ValueError(f"{facts['layers'][0]} features")
             network.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()})
-            weights = Weights(
-                network.eval(), facts["normalisation"], np.array(facts["range_deg"], dtype=float)
-            )
+            parts: dict[str, Any] = {name.removeprefix(_CONFIDENCE): a for name, a in beside.items()}
+            confidence = Confidence(**{**parts, "bias": float(parts["bias"])}) if parts else None
+            ranges = np.array(facts["range_deg"], dtype=float)
+            subjects = tuple(facts["trained_subjects"])
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise ModelError(f"{path}: its weights do not fit its layers; fit the model again") from error
-        if weights.normalisation not in NORMALISATIONS or weights.range_deg.shape != (3, 2):
+        if facts.get("normalisation") not in NORMALISATIONS or ranges.shape != (3, 2):
             raise ModelError(f"{path}: unknown normalisation or range; fit the model again")
-        return weights
+        return Weights(network.eval(), facts["normalisation"], ranges, confidence, subjects)

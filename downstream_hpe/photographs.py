@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -16,21 +19,31 @@ from downstream_hpe.tables import Rows
 
 LARGEST_DEG = 99.0
 """The usual filter of AFLW2000-3D: a label with a larger angle is left out."""
+FACES = 5
+"""So many faces are looked for where the label says which one is meant."""
 
 
 @dataclass(frozen=True)
 class Photograph:
-    """bgr uint8 [H, W, 3]; rotation float64 [3, 3], R_C; subject: who it is,
-    or the picture's own name where that is unknown."""
+    """bgr uint8 [H, W, 3]; rotation float64 [3, 3], R_C; subject: who it is, or the picture's own name
+    where that is unknown; centre float [2]: where in the picture the labelled face is, pixels, None
+    where the label does not say."""
 
     name: str
     subject: str
     bgr: np.ndarray
     rotation: np.ndarray
+    centre: np.ndarray | None = None
 
 
-def aflw2000(folder: Path) -> Iterator[Photograph]:
-    """AFLW2000-3D: image00002.jpg beside image00002.mat, whose Pose_Para is pitch, yaw, roll in radians.
+Loader = Callable[[Path, Counter[str]], Iterator[Photograph]]
+"""Called with the folder or file, and a count of what is left out, by its reason."""
+
+
+def aflw2000(folder: Path, left_out: Counter[str]) -> Iterator[Photograph]:
+    """AFLW2000-3D: image00002.jpg beside image00002.mat.
+
+    Pose_Para is pitch, yaw, roll, ... in radians; the mean of pt3d_68 says which face is meant.
 
     Raises
     ------
@@ -39,97 +52,146 @@ def aflw2000(folder: Path) -> Iterator[Photograph]:
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
-    for file in _some(folder, "*.mat"):
+    for file in _some(folder.glob("*.mat"), folder, "*.mat"):
         try:
-            pose = np.asarray(loadmat(file, variable_names=["Pose_Para"])["Pose_Para"], dtype=np.float64)
+            label = loadmat(file, variable_names=["Pose_Para", "pt3d_68"])
+            pose = np.asarray(label["Pose_Para"], dtype=np.float64).ravel()
+            points = np.asarray(label.get("pt3d_68", np.empty((3, 0))), dtype=np.float64)
         # scipy raises what it likes at a damaged file.
         except (MatReadError, OSError, KeyError, ValueError, TypeError, NotImplementedError) as error:
             raise DataError(f"{file}: no Pose_Para can be read from it") from error
-        if pose.size < 3:
-            raise DataError(f"{file}: Pose_Para has {pose.size} numbers, expected pitch, yaw, roll, ...")
-        pitch, yaw, roll = np.rad2deg(pose.ravel()[:3])
-        if max(abs(yaw), abs(pitch), abs(roll)) <= LARGEST_DEG:
-            picture = file.with_suffix(".jpg")
-            yield Photograph(
-                file.stem, file.stem, read_bgr(picture), rotation_from_angles(np.array([yaw, pitch, roll]))
-            )
+        if pose.size < 3 or not np.isfinite(pose[:3]).all():
+            raise DataError(f"{file}: Pose_Para is {pose.tolist()}, expected pitch, yaw, roll, ...")
+        pitch, yaw, roll = np.rad2deg(pose[:3])
+        if max(abs(yaw), abs(pitch), abs(roll)) > LARGEST_DEG:
+            left_out[f"an angle beyond {LARGEST_DEG:g} degrees"] += 1
+            continue
+        centre = points[:2].mean(axis=1) if points.shape == (3, 68) else None
+        rotation = rotation_from_angles(np.array([yaw, pitch, roll]))
+        yield Photograph(file.stem, file.stem, read_bgr(file.with_suffix(".jpg")), rotation, centre)
 
 
-def biwi(folder: Path) -> Iterator[Photograph]:
+def biwi(folder: Path, left_out: Counter[str], colour_camera: bool = False) -> Iterator[Photograph]:
     """BIWI Kinect as published: NN/frame_00003_rgb.png beside NN/frame_00003_pose.txt.
 
-    The first three lines of a pose file are a matrix M = R_C^T (the reading of FSA-Net and the papers
-    after it).
+    A pose file holds R_C (HopeNet, FSA-Net and 6DRepNet transpose it first and then read M = R_C^T; the
+    angles are the same) and the head's place in mm, both in the frame of the depth camera. With NN/rgb.cal
+    beside it, that place is projected into the picture and says which face is meant.
+
+    colour_camera: turn R_C into the frame of the colour camera, which took the picture, by the rotation
+    in rgb.cal, about a degree. The papers compare with the label as it is.
 
     Raises
     ------
-    DataError: no pose file, one that holds no rotation, or without its picture.
+    DataError: no pose file, one that holds no rotation, without its picture, or no rgb.cal where one is
+        needed.
     """
-    for file in _some(folder, "*/frame_*_pose.txt"):
-        try:
-            matrix = np.loadtxt(file, max_rows=3)
-        except (OSError, ValueError) as error:
-            raise DataError(f"{file}: expected three lines of three numbers") from error
-        if matrix.shape != (3, 3) or np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-2:
+    for file in _some(folder.rglob("frame_*_pose.txt"), folder, "frame_*_pose.txt"):
+        numbers = _numbers(file, 12, "a rotation and a place")
+        rotation, place = numbers[:9].reshape(3, 3), numbers[9:12]
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-2 or np.linalg.det(rotation) < 0:
             raise DataError(f"{file}: its first three lines are not a rotation")
+        centre = None
+        calibration = file.with_name("rgb.cal")
+        if calibration.is_file():
+            # K, four distortions, then X_colour = R X_depth + t in mm.
+            values = _numbers(calibration, 25, "K, distortion, rotation and translation")
+            turn = values[13:22].reshape(3, 3)
+            seen = values[:9].reshape(3, 3) @ (turn @ place + values[22:25])
+            centre = seen[:2] / seen[2]
+            if colour_camera:
+                rotation = turn @ rotation
+        elif colour_camera:
+            raise DataError(f"{calibration}: there is no such file; use the format biwi, which needs none")
         picture = file.with_name(file.name.replace("_pose.txt", "_rgb.png"))
-        yield Photograph(f"{file.parent.name}/{picture.stem}", file.parent.name, read_bgr(picture), matrix.T)
+        subject = file.parent.name
+        yield Photograph(f"{subject}/{picture.stem}", subject, read_bgr(picture), rotation, centre)
 
 
-def biwi_npz(file: Path) -> Iterator[Photograph]:
+def biwi_npz(file: Path, left_out: Counter[str]) -> Iterator[Photograph]:
     """BIWI as FSA-Net packs it: image uint8 [N, H, W, 3] (BGR) and pose [N, 3] (yaw, pitch, roll), degrees.
 
     Raises
     ------
-    DataError: not such a file.
+    DataError: not such a file, or angles in radians.
     """
     try:
-        with np.load(file, allow_pickle=False) as arrays:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             images, poses = arrays["image"], np.asarray(arrays["pose"], dtype=np.float64)
-    except (OSError, KeyError, ValueError) as error:
+    # numpy raises what it likes at a damaged archive.
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, EOFError, BadZipFile) as error:
         raise DataError(f"{file}: expected an .npz with the arrays image and pose") from error
     if images.ndim != 4 or images.shape[3] != 3 or poses.shape != (len(images), 3):
         raise DataError(f"{file}: image {images.shape} and pose {poses.shape} do not belong together")
+    if images.dtype != np.uint8 or not np.isfinite(poses).all():
+        raise DataError(f"{file}: expected images of uint8, not {images.dtype}, and finite angles")
+    if len(poses) > 100 and np.abs(poses).max() < np.pi:
+        raise DataError(f"{file}: no angle beyond {np.pi:.2f}; expected degrees, these look like radians")
     for n, (image, pose) in enumerate(zip(images, poses, strict=True)):
-        yield Photograph(f"{n:06d}", file.stem, image.astype(np.uint8), rotation_from_angles(pose))
+        yield Photograph(f"{n:06d}", file.stem, image, rotation_from_angles(pose))
 
 
-FORMATS: dict[str, Callable[[Path], Iterator[Photograph]]] = {
+FORMATS: dict[str, Loader] = {
     "aflw2000": aflw2000,
     "biwi": biwi,
+    "biwi-colour": partial(biwi, colour_camera=True),
     "biwi-npz": biwi_npz,
 }
 
 
 def detected_rows(
-    photographs: Iterator[Photograph], landmarks: Callable[[np.ndarray], np.ndarray | None]
-) -> Rows:
-    """Rows of the photographs in which a face is found.
+    photographs: Iterator[Photograph], faces: Callable[[np.ndarray, int], np.ndarray]
+) -> tuple[Rows, np.ndarray]:
+    """Rows of the photographs in which the labelled face is found, and (yaw, pitch, roll) of the others,
+    float64 [M, 3]. Another face than the labelled one is a miss.
 
-    landmarks: :meth:`downstream_hpe.predictor.Predictor.landmarks`.
+    faces: :meth:`downstream_hpe.predictor.Predictor.faces`.
 
     Raises
     ------
     DataError: none found.
     """
     subjects, rotations, found = [], [], []
-    undetected = 0
+    missed = []
     for photograph in photographs:
-        points = landmarks(photograph.bgr)
-        if points is None:
-            undetected += 1
+        points = faces(photograph.bgr, 1 if photograph.centre is None else FACES)
+        if photograph.centre is not None:
+            points = _at(points, photograph.centre)
+        if not len(points):
+            missed.append(angles_from_rotation(photograph.rotation))
             continue
         subjects.append(photograph.subject)
         rotations.append(photograph.rotation)
-        found.append(points.astype(np.float32))
+        found.append(points[0].astype(np.float32))
     if not found:
-        raise DataError(f"no face found in {undetected} photographs")
+        raise DataError(f"no face found in {len(missed)} photographs")
     names, rotation = np.array(subjects), np.stack(rotations)
-    return Rows(names, names, angles_from_rotation(rotation), rotation, np.stack(found), undetected)
+    rows = Rows(names, names, angles_from_rotation(rotation), rotation, np.stack(found), len(missed))
+    return rows, np.array(missed).reshape(-1, 3)
 
 
-def _some(folder: Path, pattern: str) -> list[Path]:
-    files = sorted(folder.glob(pattern))
-    if not files:
+def _at(faces: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Of the faces [F, 468, 3] the one at centre, or none: [0 or 1, 468, 3]."""
+    xy = faces[..., :2]
+    low, high = xy.min(axis=1), xy.max(axis=1)
+    distances = np.linalg.norm((low + high) / 2 - centre, axis=-1) / (high - low).max(axis=-1)
+    # Half its size away, the labelled point would be on its edge.
+    return faces[distances < 0.6][np.argsort(distances[distances < 0.6])[:1]]
+
+
+def _numbers(file: Path, count: int, what: str) -> np.ndarray:
+    """The first numbers of a text file."""
+    try:
+        numbers = np.array(file.read_text(encoding="ascii").split()[:count], dtype=np.float64)
+    except (OSError, ValueError) as error:
+        raise DataError(f"{file}: expected {count} numbers, {what}") from error
+    if len(numbers) < count or not np.isfinite(numbers).all():
+        raise DataError(f"{file}: expected {count} numbers, {what}")
+    return numbers
+
+
+def _some(files: Iterator[Path], folder: Path, pattern: str) -> list[Path]:
+    found = sorted(files)
+    if not found:
         raise DataError(f"{folder}: no {pattern} in it")
-    return files
+    return found

@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Pictures in and out: read one, draw the axes of a head on it."""
+"""Pictures in and out: read one, draw heads' axes and angles on it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.face import Face
 
-AXES = ((0, (255, 60, 60)), (1, (60, 200, 60)), (2, (80, 120, 255)))
+AXES = ((0, (255, 60, 60)), (1, (60, 210, 60)), (2, (70, 130, 255)))
 """Columns of R_C and their colours: image-right red, down green, and ahead of the nose blue."""
+UNSURE = 0.7
+"""So far towards grey is an axis that may be wrong."""
+GREY = (185, 185, 185)
+EDGE = (15, 15, 15)
+SMALLEST = 384
+"""A drawn copy has at least so many pixels on its shorter side, for its text to be read."""
 
 
 def read_bgr(path: Path) -> np.ndarray:
@@ -19,28 +27,87 @@ def read_bgr(path: Path) -> np.ndarray:
     try:
         with Image.open(path) as image:
             rgb = ImageOps.exif_transpose(image).convert("RGB")
-    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+    # Pillow raises SyntaxError and ValueError, too, at damaged files.
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(f"{path}: not a readable picture") from error
     return np.asarray(rgb)[..., ::-1]
 
 
-def draw_axes(bgr: np.ndarray, landmarks: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """The picture with the head's axes from the middle of the face; the blue one points where the nose does.
+def write_bgr(bgr: np.ndarray, path: Path) -> None:
+    """uint8 [H, W, 3] to a file, by its suffix; its folder is made. DataError where that fails."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray(np.ascontiguousarray(bgr[..., ::-1])).save(path)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error.strerror})") from error
 
-    bgr: uint8 [H, W, 3]. landmarks: float [468, 3], pixels. rotation: R_C, float [3, 3].
+
+def draw_faces(bgr: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
+    """A copy with the axes and angles of every face; the blue axis points where the nose does.
+
+    Grey where the pose may not be believed: low confidence, or outside the trained range. Small
+    pictures are enlarged. bgr: uint8 [H, W, 3].
     """
     image = Image.fromarray(np.ascontiguousarray(bgr[..., ::-1]))
-    draw = ImageDraw.Draw(image)
-    centre = landmarks[:, :2].mean(axis=0)
-    length = np.ptp(landmarks[:, 1]) / 2
-    for column, colour in AXES:
-        # The nose looks along -z of its own frame, towards the camera at pose zero.
-        direction = rotation[:2, column] * (-1 if column == 2 else 1)
-        ends = [tuple(centre), tuple(centre + length * direction)]
-        draw.line(ends, fill=colour, width=max(2, round(length / 25)))
+    scale = max(1, -(-SMALLEST // min(image.size)))
+    if scale > 1:
+        image = image.resize((image.width * scale, image.height * scale), Image.Resampling.LANCZOS)
+    for face in faces:
+        _axes(image, face, scale)
+    # This mode blends what is drawn with alpha.
+    draw = ImageDraw.Draw(image, "RGBA")
+    for face in faces:
+        _label(draw, face, scale, image.size, len(faces) > 1)
     return np.asarray(image)[..., ::-1]
 
 
-def write_bgr(bgr: np.ndarray, path: Path) -> None:
-    """uint8 [H, W, 3] to a file, by its suffix."""
-    Image.fromarray(np.ascontiguousarray(bgr[..., ::-1])).save(path)
+def _axes(image: Image.Image, face: Face, scale: int) -> None:
+    left, top, width, height = (side * scale for side in face.box)
+    length = 0.6 * max(width, height)
+    half = round(1.15 * length)
+    # Drawn larger and reduced, as Pillow's lines have jagged edges.
+    fine = max(1, min(3, 1000 // half))
+    layer = Image.new("RGBA", (2 * half * fine, 2 * half * fine))
+    draw = ImageDraw.Draw(layer)
+    centre = np.array([half * fine, half * fine])
+    thick = max(3, length / 28) * fine
+    # The nose looks along -z of its own frame, towards the camera at pose zero.
+    faded = 0.0 if face.sure else UNSURE
+    ends = [(face.rotation[:, k] * (-1 if k == 2 else 1), _mixed(colour, faded)) for k, colour in AXES]
+    # Far ends first, so that the nearer axis covers the farther one.
+    for direction, colour in sorted(ends, key=lambda end: -end[0][2]):
+        end = centre + length * fine * direction[:2]
+        for edge, fill in ((1.5 * fine, EDGE), (0, colour)):
+            draw.line([*centre, *end], fill=fill, width=round(thick + 2 * edge))
+            for at, radius in ((centre, thick / 2 + edge), (end, thick + edge)):
+                draw.ellipse([*(at - radius), *(at + radius)], fill=fill)
+    layer = layer.reduce(fine)
+    image.paste(layer, (round(left + width / 2) - half, round(top + height / 2) - half), layer)
+
+
+def _mixed(colour: tuple[int, int, int], faded: float) -> tuple[int, ...]:
+    return tuple(round((1 - faded) * c + faded * g) for c, g in zip(colour, GREY, strict=True))
+
+
+def _label(draw: ImageDraw.ImageDraw, face: Face, scale: int, size: tuple[int, int], numbered: bool) -> None:
+    left, top, width, height = (side * scale for side in face.box)
+    lines = ["  ".join(f"{n} {a:+.0f}°" for n, a in zip(("yaw", "pitch", "roll"), face.ypr_deg, strict=True))]
+    if numbered:
+        lines[0] = f"#{face.index}  {lines[0]}"
+    if face.confidence is not None:
+        lines.append(f"confidence {face.confidence:.0%}")
+    if not face.in_range:
+        lines.append("outside the trained range")
+    text = "\n".join(lines)
+    points = min(max(height / 12, min(size) / 34, 12), min(size) / 16)
+    font = ImageFont.load_default(size=points)
+    pad = points / 3
+    x0, y0, x1, y1 = draw.multiline_textbbox((0, 0), text, font=font)
+    wide, high = x1 - x0 + 2 * pad, y1 - y0 + 2 * pad
+    # Above the face where there is room, else below; always inside the picture.
+    y = top - high - pad if top - high - pad >= 0 else top + height + pad
+    x = min(max(left + width / 2 - wide / 2, 0), max(size[0] - wide, 0))
+    y = min(max(y, 0), max(size[1] - high, 0))
+    draw.rectangle([x, y, x + wide, y + high], fill=(*EDGE, 185))
+    ink = (255, 255, 255) if face.sure else (255, 205, 90)
+    draw.multiline_text((x + pad - x0, y + pad - y0), text, font=font, fill=ink)

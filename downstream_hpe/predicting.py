@@ -1,114 +1,108 @@
 # SPDX-License-Identifier: MIT
-"""What `downstream-hpe predict` does: inputs in, one record a picture or frame out."""
+"""What `downstream-hpe predict` does: pictures and videos in, one record a face out."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from downstream_hpe.errors import UsageError
-from downstream_hpe.pictures import draw_axes, read_bgr, write_bgr
+from downstream_hpe.errors import DataError
+from downstream_hpe.face import Face, FaceTracks
+from downstream_hpe.inputs import Source
+from downstream_hpe.pictures import draw_faces, read_bgr, write_bgr
 from downstream_hpe.predictor import Predictor
+from downstream_hpe.records import Record, record
 from downstream_hpe.rotation import angles_from_rotation
-from downstream_hpe.smoothing import OneEuroFilter
-from downstream_hpe.video import SUFFIXES, VideoReader, VideoWriter
-
-PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".webp"}
-COLUMNS = ("input", "frame", "time_s", "found", "yaw_deg", "pitch_deg", "roll_deg")
-
-Record = dict[str, Any]
+from downstream_hpe.video import VideoReader, VideoWriter
 
 
-def sources(inputs: Sequence[str]) -> list[Path | int]:
-    """Pictures, videos and webcams: a folder stands for the pictures and videos in it, webcam:N for a number.
+@dataclass(frozen=True)
+class Options:
+    """faces: at most so many a picture or frame. drawn: folder for copies with the poses drawn.
+    smooth: one-euro filter on video, one a face. frames: of a video, at most so many."""
 
-    Raises
-    ------
-    UsageError: something that is not there, or a folder with nothing to read.
-    """
-    found: list[Path | int] = []
-    for text in inputs:
-        kind, _, number = text.partition(":")
-        path = Path(text)
-        if kind == "webcam":
-            if not number.isdigit():
-                raise UsageError(f"{text}: expected a number, such as webcam:0")
-            found.append(int(number))
-        elif path.is_dir():
-            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES | SUFFIXES)
-            if not inside:
-                raise UsageError(f"{path}: no picture or video in it")
-            found += inside
-        elif path.is_file():
-            found.append(path)
-        else:
-            raise UsageError(f"{path}: there is no such picture, video or folder")
-    return found
+    faces: int = 1
+    drawn: Path | None = None
+    smooth: bool = False
+    frames: int | None = None
 
 
 def predictions(
-    every: Sequence[Path | int],
+    every: Sequence[Source],
     predictor: Predictor,
-    drawn: Path | None = None,
-    *,
-    smooth: bool = False,
-    frames: int | None = None,
-) -> Iterator[Record]:
-    """A record (COLUMNS) a picture or frame; angles are None where no face is found.
+    options: Options = Options(),
+    leave_out: Callable[[str], None] = lambda text: None,
+) -> Generator[Record, None, None]:
+    """A record a face, and one that says so for a picture or frame without any.
 
-    drawn: folder for copies with the axes drawn. smooth: one-euro filter on video, started afresh
-    after frames without a face. frames: of a video, at most so many.
+    leave_out: called with one line for what cannot be read, and where a video ends early.
     """
-    if drawn is not None:
-        drawn.mkdir(parents=True, exist_ok=True)
     for source in every:
-        if isinstance(source, Path) and source.suffix.lower() not in SUFFIXES:
-            image = read_bgr(source)
-            rotation, copy = _pose(image, predictor, drawn is not None, None, 0.0)
-            if drawn is not None:
-                write_bgr(copy, drawn / f"{source.stem}.png")
-            yield _record(str(source), None, None, rotation)
+        try:
+            if source.moving:
+                reader = VideoReader(source.path)
+            else:
+                image = read_bgr(Path(source.name))
+        except DataError as error:
+            leave_out(str(error))
+            continue
+        if source.moving:
+            yield from _video(source, reader, predictor, options, leave_out)
         else:
-            yield from _video(source, predictor, drawn, smooth, frames)
+            yield from _picture(source, image, predictor, options)
+
+
+def _picture(source: Source, image: np.ndarray, predictor: Predictor, options: Options) -> Iterator[Record]:
+    faces = _faces(image, predictor, options, FaceTracks(smooth=False), 0.0)
+    if options.drawn is not None:
+        write_bgr(draw_faces(image, faces), options.drawn / source.copy)
+    for face in faces or (None,):
+        yield record(source.name, None, None, face)
 
 
 def _video(
-    source: Path | int, predictor: Predictor, drawn: Path | None, smooth: bool, frames: int | None
+    source: Source,
+    reader: VideoReader,
+    predictor: Predictor,
+    options: Options,
+    leave_out: Callable[[str], None],
 ) -> Iterator[Record]:
-    name = f"webcam:{source}" if isinstance(source, int) else str(source)
-    stem = f"webcam{source}" if isinstance(source, int) else source.stem
-    with VideoReader(source) as reader, VideoWriter((drawn or Path()) / f"{stem}.mp4", reader.rate) as writer:
-        steady = OneEuroFilter() if smooth else None
+    count = 0
+    target = None if options.drawn is None else options.drawn / source.copy
+    with reader, VideoWriter(target, reader.rate) as writer:
+        tracks = FaceTracks(options.smooth)
         began = time.monotonic()
-        for number, image in enumerate(islice(reader, frames)):
+        for image in islice(reader, options.frames):
             # A file has a rate; a webcam gives a frame whenever it is asked.
-            time_s = time.monotonic() - began if isinstance(source, int) else number / reader.rate
-            rotation, copy = _pose(image, predictor, drawn is not None, steady, time_s)
-            if rotation is None and smooth:
-                steady = OneEuroFilter()
-            if drawn is not None:
-                writer.add(copy)
-            yield _record(name, number, time_s, rotation)
+            live = isinstance(source.path, int)
+            time_s = time.monotonic() - began if live else count / reader.rate
+            faces = _faces(image, predictor, options, tracks, time_s)
+            if target is not None:
+                writer.add(draw_faces(image, faces))
+            for face in faces or (None,):
+                yield record(source.name, count, time_s, face)
+            count += 1
+    if options.frames is None and reader.ended_early(count):
+        leave_out(f"{source.name}: ended after {count} of {reader.expected} frames; what there was is kept")
 
 
-def _pose(
-    image: np.ndarray, predictor: Predictor, draw: bool, steady: OneEuroFilter | None, time_s: float
-) -> tuple[np.ndarray | None, np.ndarray]:
-    """R_C of the face, or None, and the picture, with axes where asked for."""
-    points = predictor.landmarks(image)
-    if points is None:
-        return None, image
-    rotation = predictor.from_landmarks(points[None]).rotation[0].astype(np.float64)
-    if steady is not None:
-        rotation = steady(rotation, time_s)
-    return rotation, draw_axes(image, points, rotation) if draw else image
-
-
-def _record(name: str, frame: int | None, time_s: float | None, rotation: np.ndarray | None) -> Record:
-    angles = [None] * 3 if rotation is None else np.round(angles_from_rotation(rotation), 3).tolist()
-    return dict(zip(COLUMNS, (name, frame, time_s, rotation is not None, *angles), strict=True))
+def _faces(
+    image: np.ndarray, predictor: Predictor, options: Options, tracks: FaceTracks, time_s: float
+) -> list[Face]:
+    found = predictor.faces(image, options.faces)
+    if not len(found):
+        tracks.indices(found, time_s)
+        return []
+    pose = predictor.from_landmarks(found)
+    faces = []
+    for n, index in enumerate(tracks.indices(found, time_s)):
+        rotation = tracks.steady(index, pose.rotation[n].astype(np.float64), time_s)
+        ypr_deg = angles_from_rotation(rotation)
+        confidence = None if pose.confidence is None else float(pose.confidence[n])
+        faces.append(Face(index, found[n], rotation, ypr_deg, confidence, predictor.in_range(ypr_deg)))
+    return sorted(faces, key=lambda face: face.index)

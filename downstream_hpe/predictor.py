@@ -10,71 +10,91 @@ from typing import Any
 
 import numpy as np
 
+from downstream_hpe import graph
+from downstream_hpe.detector import FaceDetector
 from downstream_hpe.errors import DataError, ModelError
 from downstream_hpe.normalise import POINTS
 
 MODEL_FILE = "model.onnx"
 FORMAT = "downstream-hpe 1"
+DEFAULT_MODEL = "headturn"
+MODELS = Path(__file__).parent / "models"
+"""The models that come with the package, by name."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """ypr_deg float32 [N, 3], (yaw, pitch, roll); rotation float32 [N, 3, 3], R_C."""
+    """ypr_deg float32 [N, 3], (yaw, pitch, roll); rotation float32 [N, 3, 3], R_C; confidence
+    float32 [N], 0 to 1, or None where the model gives none."""
 
     ypr_deg: np.ndarray
     rotation: np.ndarray
+    confidence: np.ndarray | None = None
 
 
 class Predictor:
     """Open one with :meth:`load`.
 
     range_deg: float [3, 2], the angles the model was trained on; beyond them it extrapolates.
+    trained_subjects: whom it has seen, so that nobody measures it on them.
     """
 
-    def __init__(self, session: Any, range_deg: np.ndarray) -> None:
+    def __init__(
+        self, session: Any, range_deg: np.ndarray, trained_subjects: frozenset[str], name: str
+    ) -> None:
         self._session = session
-        self._detector: Any = None
+        self._name = name
+        self._outputs = [value.name for value in session.get_outputs() if value.name in SHAPES]
+        self._detector = FaceDetector()
         self.range_deg = range_deg
+        self.trained_subjects = trained_subjects
 
     @staticmethod
-    def load(path: Path | str, *, threads: int = 1) -> Predictor:
-        """path: a model folder of `downstream-hpe fit`, or an exported .onnx file.
+    def load(model: Path | str = DEFAULT_MODEL, *, threads: int = 1) -> Predictor:
+        """model: the name of a model that comes with the package, a model folder of `downstream-hpe fit`,
+        or an exported .onnx file.
+
+        The file may come from anywhere: it is read as numbers and arithmetic only, see
+        :mod:`downstream_hpe.graph`.
 
         Raises
         ------
         ModelError: nothing there, not an ONNX file, or not one that `downstream-hpe export` wrote.
         """
-        file = Path(path)
-        if file.is_dir():
-            file = file / MODEL_FILE
-        if not file.is_file():
-            raise ModelError(
-                f"{file}: no such model; expected a folder of downstream-hpe fit or an .onnx file"
-            )
+        file = _file_of(model)
         try:
-            import onnxruntime as ort
-            from onnxruntime.capi import onnxruntime_pybind11_state as faults
-        except ImportError as error:
-            raise ModelError("onnxruntime is not installed: pip install 'headturn[hpe]'") from error
-        options = ort.SessionOptions()
-        options.intra_op_num_threads = threads
-        broken = (faults.InvalidProtobuf, faults.InvalidGraph, faults.Fail, faults.InvalidArgument)
-        try:
-            session = ort.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-        except broken as error:
-            raise ModelError(f"{file}: not a readable ONNX model ({str(error).splitlines()[0]})") from error
+            if file.stat().st_size > graph.MAX_BYTES:
+                raise ModelError(
+                    f"{file}: larger than {graph.MAX_BYTES / 1e6:.0f} MB; no model of this program"
+                )
+            content = file.read_bytes()
+        except OSError as error:
+            raise ModelError(f"{file}: cannot be read ({error.strerror})") from error
+        session = _open(file, content, threads)
         text = session.get_modelmeta().custom_metadata_map.get("downstream-hpe", "{}")
         try:
             facts = json.loads(text)
             ranges = np.array(facts["range_deg"], dtype=np.float64)
-        except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+            subjects = frozenset(map(str, facts["trained_subjects"]))
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise ModelError(
                 f"{file}: no downstream-hpe metadata; export it with downstream-hpe export"
             ) from error
-        names = {value.name for value in session.get_outputs()}
-        if facts.get("format") != FORMAT or ranges.shape != (3, 2) or not {"ypr_deg", "rotation"} <= names:
+        if facts.get("format") != FORMAT:
             raise ModelError(f"{file}: format {facts.get('format')!r}, expected {FORMAT!r}")
-        return Predictor(session, ranges)
+        if ranges.shape != (3, 2) or not (ranges[:, 0] < ranges[:, 1]).all():
+            raise ModelError(f"{file}: its trained range is no range of three angles; export it again")
+        found = {v.name: (v.type, v.shape[1:]) for v in (*session.get_inputs(), *session.get_outputs())}
+        for name, shape in SHAPES.items():
+            optional = name == "confidence" and name not in found
+            if not optional and found.get(name) != ("tensor(float)", shape):
+                raise ModelError(f"{file}: {name} is not float [N{''.join(f', {n}' for n in shape)}]")
+        return Predictor(session, ranges, subjects, str(file))
+
+    def in_range(self, ypr_deg: np.ndarray) -> Any:
+        """Whether all three angles are among those the model was trained on: float [..., 3] -> bool [...]."""
+        low, high = self.range_deg.T
+        return ((ypr_deg >= low) & (ypr_deg <= high)).all(axis=-1)
 
     def from_landmarks(self, landmarks: np.ndarray) -> Pose:
         """Pose of faces given by their landmarks.
@@ -92,43 +112,84 @@ class Predictor:
         if not np.isfinite(points).all():
             raise DataError("landmarks are not finite; leave out faces that were not detected")
         if not len(points):
-            return Pose(np.empty((0, 3), dtype=np.float32), np.empty((0, 3, 3), dtype=np.float32))
-        ypr, rotation = self._session.run(["ypr_deg", "rotation"], {"landmarks": points})
-        return Pose(ypr, rotation)
+            none = {name: np.empty((0, *SHAPES[name]), dtype=np.float32) for name in self._outputs}
+            return _pose(none)
+        found = dict(zip(self._outputs, self._session.run(self._outputs, {"landmarks": points}), strict=True))
+        if not all(np.isfinite(value).all() for value in found.values()):
+            if (np.ptp(points, axis=1) == 0).all(axis=1).any():
+                raise DataError(
+                    "the landmarks of a face all coincide; leave out faces that were not detected"
+                )
+            raise ModelError(f"{self._name}: gives numbers that are not finite; export it again")
+        return _pose(found)
 
-    def from_image(self, bgr: np.ndarray) -> Pose | None:
-        """Pose of the most prominent face of a picture (N = 1), or None where no face is found.
+    def from_image(self, bgr: np.ndarray, faces: int = 1) -> Pose | None:
+        """Pose of the most prominent faces of a picture, at most so many; None where no face is found.
 
         bgr: uint8 [H, W, 3]. Needs mediapipe, which is opened on the first call.
         """
-        points = self.landmarks(bgr)
-        return None if points is None else self.from_landmarks(points[None])
+        points = self.faces(bgr, faces)
+        return self.from_landmarks(points) if len(points) else None
 
-    def landmarks(self, bgr: np.ndarray) -> np.ndarray | None:
-        """float64 [468, 3] of the most prominent face, isotropic pixels, frame C; None: no face."""
-        if self._detector is None:
-            self._detector = _face_mesh()
-        if bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.uint8:
-            raise DataError(f"expected a uint8 picture [H, W, 3], got {bgr.dtype} {bgr.shape}")
-        found = self._detector.process(np.ascontiguousarray(bgr[..., ::-1])).multi_face_landmarks
-        if not found:
-            return None
-        height, width = bgr.shape[:2]
-        points = np.array([(p.x, p.y, p.z) for p in found[0].landmark[:POINTS]])
-        return points * np.array([width, height, width])
+    def faces(self, bgr: np.ndarray, limit: int = 1) -> np.ndarray:
+        """Landmarks of the most prominent faces: :meth:`downstream_hpe.detector.FaceDetector.faces`."""
+        return self._detector.faces(bgr, limit)
 
     def close(self) -> None:
         """Free the face detector, if one was opened."""
-        if self._detector is not None:
-            self._detector.close()
-            self._detector = None
+        self._detector.close()
 
 
-def _face_mesh() -> Any:
+SHAPES = {"landmarks": [POINTS, 3], "ypr_deg": [3], "rotation": [3, 3], "confidence": []}
+"""The graph's input and outputs, after the first axis; confidence may be missing."""
+
+
+def shipped_models() -> list[str]:
+    """Names of the models that come with the package."""
+    return sorted(file.stem for file in MODELS.glob("*.onnx"))
+
+
+def model_folder(model: Path | str) -> Path | None:
+    """The folder of `downstream-hpe fit` that is meant; None for a model's name and for a single file."""
+    # A path with a folder in it (./headturn) or a Path is never a name.
+    named = isinstance(model, str) and model in shipped_models()
+    return Path(model) if not named and Path(model).is_dir() else None
+
+
+def _file_of(model: Path | str) -> Path:
+    if isinstance(model, str) and model in shipped_models():
+        return MODELS / f"{model}.onnx"
+    folder = model_folder(model)
+    file = Path(model) if folder is None else folder / MODEL_FILE
+    if not file.is_file():
+        raise ModelError(
+            f"{file}: no such model; expected a folder of downstream-hpe fit, an .onnx file, or one of the "
+            f"models that come with this program: {', '.join(shipped_models()) or 'none'}"
+        )
+    return file
+
+
+def _open(file: Path, content: bytes, threads: int) -> Any:
     try:
-        from mediapipe.python.solutions.face_mesh import FaceMesh
+        import onnxruntime as ort
+        from onnxruntime.capi import onnxruntime_pybind11_state as faults
     except ImportError as error:
-        raise ModelError("mediapipe is not installed: pip install mediapipe==0.10.21") from error
-    return FaceMesh(
-        static_image_mode=True, max_num_faces=1, refine_landmarks=False, min_detection_confidence=0.5
-    )
+        raise ModelError("onnxruntime is not installed: pip install 'headturn[pose]'") from error
+    reason = graph.fault(content)
+    if reason is not None:
+        raise ModelError(f"{file}: not a readable ONNX model of this program ({reason})")
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.log_severity_level = 4
+    # Its exceptions have no base of their own.
+    theirs = [e for e in vars(faults).values() if isinstance(e, type) and issubclass(e, Exception)]
+    broken: tuple[type[Exception], ...] = (*theirs, RuntimeError, MemoryError)
+    try:
+        return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except broken as error:
+        text = (str(error).splitlines() or ["out of memory"])[0]
+        raise ModelError(f"{file}: not a readable ONNX model ({text})") from error
+
+
+def _pose(found: dict[str, np.ndarray]) -> Pose:
+    return Pose(found["ypr_deg"], found["rotation"], found.get("confidence"))

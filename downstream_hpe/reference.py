@@ -12,24 +12,16 @@ from downstream_hpe.normalise import ORIGIN, POINTS, normalise
 from downstream_hpe.tables import Rows
 
 FOREHEAD, CHIN = 10, 152
-NEAR_FRONTAL_DEG = 15.0
 
 
 def mean_face(rows: Rows) -> np.ndarray:
-    """The mean near-frontal face of a training set, levelled: every row is turned back by its R_C.
+    """The mean face of a training set, levelled: every row is turned back by its R_C.
 
-    Rows within 15° of the front count, every head the same. float64 [468, 3], frame C, RMS 1.
-
-    Raises
-    ------
-    DataError: no row within 15° of the front.
+    All poses count, since a detector's depth leans most at the front: the mean of near-frontal faces
+    alone makes a worse reference. Every head counts the same. float64 [468, 3], frame C, RMS 1.
     """
-    near = np.abs(rows.ypr_deg).max(axis=1) <= NEAR_FRONTAL_DEG
-    if not near.any():
-        raise DataError("no row within 15° of the front, so no mean face; give a reference face")
-    chosen = rows.take(near)
-    level = normalise(chosen.landmarks.astype(np.float64)) @ chosen.rotation  # rows x^T R = (R^T x)^T
-    heads = [level[chosen.heads == head].mean(axis=0) for head in np.unique(chosen.heads)]
+    level = normalise(rows.landmarks.astype(np.float64)) @ rows.rotation  # rows x^T R = (R^T x)^T
+    heads = [level[rows.heads == head].mean(axis=0) for head in np.unique(rows.heads)]
     return normalise(np.mean(heads, axis=0))
 
 

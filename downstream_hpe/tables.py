@@ -69,6 +69,14 @@ class Rows:
         heads, subjects, ypr_deg, rotation, points = (array[chosen] for array in arrays)
         return Rows(heads, subjects, ypr_deg, rotation, points, 0)
 
+    @staticmethod
+    def joined(parts: Sequence[Rows]) -> Rows:
+        """The rows of several, one after the other."""
+        names = ("heads", "subjects", "ypr_deg", "rotation", "landmarks")
+        arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        heads, subjects, ypr_deg, rotation, points = arrays
+        return Rows(heads, subjects, ypr_deg, rotation, points, sum(part.undetected for part in parts))
+
 
 def open_tables(path: Path | str, columns: Sequence[str]) -> Tables:
     """The tables under a dataset, a folder of Parquet files, or one file.
@@ -130,6 +138,17 @@ def read_rows(path: Path | str, split: str | None = None) -> Rows:
     every = (np.concatenate(values) for values in zip(*found, strict=True))
     all_heads, all_subjects, ypr_deg, rotation, points = every
     return Rows(all_heads, all_subjects, ypr_deg, rotation, points, undetected)
+
+
+def read_missed(path: Path | str, split: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The rows that :func:`read_rows` leaves out: their subjects, str [M], and angles, float64 [M, 3]."""
+    columns = ["subject", "split", *ANGLE_COLUMNS, "detected"]
+    where = ~ds.field("detected")
+    if split is not None:
+        where &= ds.field("split") == split
+    batches = list(open_tables(path, columns).batches(columns, where))
+    subjects = [str(name) for batch in batches for name in column(batch, "subject")]
+    return np.array(subjects, dtype=np.str_), np.concatenate([np.empty((0, 3)), *map(angles, batches)])
 
 
 def subjects_by_split(path: Path | str) -> dict[str, set[str]]:

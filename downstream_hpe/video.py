@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from downstream_hpe.errors import DataError, ModelError
+from downstream_hpe.errors import INSTALL, DataError, ModelError
 
 SUFFIXES = {".mp4", ".mov", ".avi", ".mkv", ".webm"}
 FALLBACK_RATE = 30.0
@@ -20,7 +21,7 @@ FALLBACK_RATE = 30.0
 class VideoReader:
     """Frames of a file (its path) or a webcam (its number, from 0). Use it as a context manager.
 
-    rate: frames a second.
+    rate: frames a second. expected: how many frames a file says it has, 0 where it does not.
 
     Raises
     ------
@@ -31,10 +32,16 @@ class VideoReader:
         cv2 = _opencv()
         self._capture = cv2.VideoCapture(source if isinstance(source, int) else str(source))
         if not self._capture.isOpened():
-            what = f"webcam {source}" if isinstance(source, int) else str(source)
-            raise DataError(f"{what}: cannot be opened as video")
+            if isinstance(source, int):
+                raise DataError(f"webcam:{source}: there is no such webcam, or another program uses it")
+            raise DataError(f"{source}: cannot be opened as video; it is cut off or none")
         rate = self._capture.get(cv2.CAP_PROP_FPS)
         self.rate = rate if np.isfinite(rate) and rate > 0 else FALLBACK_RATE
+        self.expected = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+
+    def ended_early(self, count: int) -> bool:
+        """Whether the file promised more than count frames, beyond the error of such promises."""
+        return count < 0.95 * self.expected - 1
 
     def __iter__(self) -> Iterator[np.ndarray]:
         """uint8 [H, W, 3], BGR. Ends with the last whole frame, also of a file that was cut off."""
@@ -54,16 +61,22 @@ class VideoReader:
 
 
 class VideoWriter:
-    """Writes frames to an .mp4 file; opened by the first one. Use it as a context manager."""
+    """Writes frames to an .mp4 file; opened by the first one. Use it as a context manager.
 
-    def __init__(self, path: Path, rate: float) -> None:
+    path: None where no frame will come.
+    """
+
+    def __init__(self, path: Path | None, rate: float) -> None:
         self._path, self._rate = path, rate
         self._writer: Any = None
 
     def add(self, bgr: np.ndarray) -> None:
         """One frame; all of one size. DataError where the file cannot be written."""
         if self._writer is None:
+            if self._path is None:
+                raise ValueError("a frame, but no file to write it to")
             cv2 = _opencv()
+            self._path.parent.mkdir(parents=True, exist_ok=True)
             height, width = bgr.shape[:2]
             code = cv2.VideoWriter.fourcc(*"mp4v")
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate, (width, height))
@@ -82,8 +95,11 @@ class VideoWriter:
 
 
 def _opencv() -> Any:
+    # Its own lines would stand beside the one that says what went wrong.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     try:
         import cv2
     except ImportError as error:
-        raise ModelError("OpenCV is not installed: pip install mediapipe==0.10.21") from error
+        raise ModelError(f"OpenCV is not installed: {INSTALL}") from error
+    cv2.setLogLevel(0)
     return cv2

@@ -1,16 +1,43 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from PIL import Image
 from scipy.io import savemat
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.photographs import aflw2000, biwi, biwi_npz, detected_rows
+from downstream_hpe.photographs import FORMATS, aflw2000, biwi, biwi_npz, detected_rows
 from downstream_hpe.rotation import angles_from_rotation, rotation_from_angles
 
 YPR = np.array([-35, 12.5, -7])
+FACE = np.random.default_rng(0).uniform(-10, 10, size=(468, 3))
+
+# The calibration and one label as the Biwi database has them, from the card of its Hugging Face copy.
+RGB_CAL = """\
+517.679 0 320
+0 517.679 240.5
+0 0 1
+
+0 0 0 0
+
+0.999947 0.00432361 0.00929419
+-0.00446314 0.999877 0.0150443
+-0.009228 -0.015085 0.999844
+
+-24.0198 5.8896 -13.2308
+
+640 480
+"""
+POSE = """\
+0.980639 0.109899 0.162077
+-0.11023 0.993882 -0.00697376
+-0.161851 -0.011027 0.986754
+
+43.4019 -30.7038 906.864
+"""
 
 
 def picture(path):
@@ -18,62 +45,126 @@ def picture(path):
     Image.new("RGB", (8, 6), (255, 0, 0)).save(path)
 
 
+def aflw(folder, name, ypr_deg, **more):
+    yaw, pitch, roll = np.deg2rad(ypr_deg)
+    savemat(folder / f"{name}.mat", {"Pose_Para": np.array([[pitch, yaw, roll, 1, 2, 3, 0.1]]), **more})
+    picture(folder / f"{name}.jpg")
+
+
+def kinect(folder, pose=POSE, calibration=RGB_CAL):
+    picture(folder / "01" / "frame_00003_rgb.png")
+    (folder / "01" / "frame_00003_pose.txt").write_text(pose)
+    if calibration is not None:
+        (folder / "01" / "rgb.cal").write_text(calibration)
+
+
 def test_aflw2000_order_units_and_filter(tmp_path):
-    yaw, pitch, roll = np.deg2rad(YPR)
-    for name, pose in (("image00002", [pitch, yaw, roll]), ("image00004", [0, np.deg2rad(99.5), 0])):
-        savemat(tmp_path / f"{name}.mat", {"Pose_Para": np.array([[*pose, 1, 2, 3, 0.1]])})
-        picture(tmp_path / f"{name}.jpg")
-    (only,) = aflw2000(tmp_path)
-    np.testing.assert_allclose(angles_from_rotation(only.rotation), YPR, atol=1e-9)
-    assert only.bgr.shape == (6, 8, 3)
-    assert only.bgr[0, 0, 2] > 250 > only.bgr[0, 0, 0]
+    points = np.random.default_rng(0).uniform(100, 200, size=(3, 68))
+    aflw(tmp_path, "image00002", YPR, pt3d_68=points)
+    aflw(tmp_path, "image00004", [99.5, 0, 0])
+    aflw(tmp_path, "image00005", [0, -99.0, 98.9])
+    left_out = Counter()
+    first, second = aflw2000(tmp_path, left_out)
+    np.testing.assert_allclose(angles_from_rotation(first.rotation), YPR, atol=1e-9)
+    np.testing.assert_allclose(first.centre, points[:2].mean(axis=1))
+    assert second.centre is None
+    assert first.bgr.shape == (6, 8, 3)
+    assert first.bgr[0, 0, 2] > 250 > first.bgr[0, 0, 0]
+    assert left_out == {"an angle beyond 99 degrees": 1}
 
 
-def test_biwi_reading_of_fsa_net(tmp_path):
-    matrix = rotation_from_angles(YPR).T
-    text = "\n".join(" ".join(f"{x:.6f}" for x in row) for row in matrix) + "\n\n10.0 20.0 900.0\n"
-    picture(tmp_path / "01" / "frame_00003_rgb.png")
-    (tmp_path / "01" / "frame_00003_pose.txt").write_text(text)
-    (only,) = biwi(tmp_path)
-    # docs/conventions.md, BIWI file matrix, FSA-Net reading.
-    roll = -np.arctan2(matrix[1, 0], matrix[0, 0])
-    yaw = -np.arctan2(-matrix[2, 0], np.hypot(matrix[2, 1], matrix[2, 2]))
-    pitch = np.arctan2(matrix[2, 1], matrix[2, 2])
-    np.testing.assert_allclose(np.rad2deg([yaw, pitch, roll]), YPR, atol=1e-4)
-    np.testing.assert_allclose(angles_from_rotation(only.rotation), YPR, atol=1e-4)
+def test_biwi_angles_are_those_of_its_usual_readers(tmp_path):
+    kinect(tmp_path / "hpdb")
+    (only,) = biwi(tmp_path, Counter())
+    # HopeNet, FSA-Net, 6DRepNet: the file's matrix, transposed first.
+    m = np.array(POSE.split()[:9], dtype=float).reshape(3, 3).T
+    roll, pitch = -np.arctan2(m[1, 0], m[0, 0]), np.arctan2(m[2, 1], m[2, 2])
+    yaw = -np.arctan2(-m[2, 0], np.hypot(m[2, 1], m[2, 2]))
+    np.testing.assert_allclose(angles_from_rotation(only.rotation), np.rad2deg([yaw, pitch, roll]), atol=1e-3)
+    # The head is right of the middle and above it, as its place in millimetres says.
+    expected = np.array([320, 240.5]) + 517.679 * np.array([27.66, -11.36]) / 892.97
+    np.testing.assert_allclose(only.centre, expected, atol=0.1)
     assert only.subject == "01"
+
+
+def test_biwi_in_the_frame_of_the_colour_camera(tmp_path):
+    kinect(tmp_path)
+    (label,), (seen,) = biwi(tmp_path, Counter()), FORMATS["biwi-colour"](tmp_path, Counter())
+    turn = np.array(RGB_CAL.split()[13:22], dtype=float).reshape(3, 3)
+    np.testing.assert_allclose(seen.rotation, turn @ label.rotation)
+    (tmp_path / "01" / "rgb.cal").unlink()
+    (plain,) = biwi(tmp_path, Counter())
+    assert plain.centre is None
+    with pytest.raises(DataError, match=r"rgb\.cal: there is no such file"):
+        list(FORMATS["biwi-colour"](tmp_path, Counter()))
+
+
+def test_the_generators_biwi_export_is_read_back(tmp_path):
+    rotation = rotation_from_angles(YPR)
+    lines = "\n".join(" ".join(f"{x:.12f}" for x in row) for row in rotation)
+    identity = "700 0 128\n0 700 128\n0 0 1\n\n0 0 0 0\n\n1 0 0\n0 1 0\n0 0 1\n\n0 0 0\n\n256 256\n"
+    kinect(tmp_path, f"{lines}\n\n0 0 700\n", identity)
+    (only,) = biwi(tmp_path, Counter())
+    np.testing.assert_allclose(only.rotation, rotation, atol=1e-9)
+    np.testing.assert_allclose(only.centre, [128, 128])
 
 
 def test_biwi_as_npz(tmp_path):
     np.savez(tmp_path / "b.npz", image=np.zeros((2, 4, 4, 3), np.uint8), pose=np.stack([YPR, -YPR]))
-    first, second = biwi_npz(tmp_path / "b.npz")
+    first, second = biwi_npz(tmp_path / "b.npz", Counter())
     np.testing.assert_allclose(angles_from_rotation(first.rotation), YPR)
     np.testing.assert_allclose(angles_from_rotation(second.rotation), -YPR)
+    radians = np.deg2rad(np.tile(YPR, (200, 1)))
+    np.savez(tmp_path / "r.npz", image=np.zeros((200, 4, 4, 3), np.uint8), pose=radians)
+    with pytest.raises(DataError, match="these look like radians"):
+        list(biwi_npz(tmp_path / "r.npz", Counter()))
 
 
-def test_rows_of_those_with_a_face(tmp_path):
-    np.savez(
-        tmp_path / "b.npz",
-        image=np.stack([np.zeros((4, 4, 3)), np.ones((4, 4, 3))]),
-        pose=np.stack([YPR, -YPR]),
-    )
-    rows = detected_rows(biwi_npz(tmp_path / "b.npz"), lambda bgr: np.ones((468, 3)) if bgr.any() else None)
-    assert (len(rows), rows.undetected) == (1, 1)
+def test_the_labelled_face_among_several_and_misses(tmp_path):
+    for n, x in enumerate((100, 300, 700)):
+        aflw(tmp_path, f"image{n}", YPR + n, pt3d_68=np.full((3, 68), float(x)))
+    # Two faces, the more prominent one at 300; none at 700.
+    two = np.stack([FACE + np.array(at) for at in ((300, 300, 0), (102, 100, 0))])
+    asked = []
+
+    def faces(bgr, limit):
+        asked.append(limit)
+        return two[:limit]
+
+    rows, missed_deg = detected_rows(aflw2000(tmp_path, Counter()), faces)
+    assert min(asked) > 1
+    assert (len(rows), rows.undetected) == (2, 1)
+    np.testing.assert_allclose(rows.landmarks[:, :, 0].mean(axis=1), two[::-1, :, 0].mean(axis=1), atol=1e-4)
+    np.testing.assert_allclose(missed_deg, [YPR + 2])
+    with pytest.raises(DataError, match="no face found in 3 photographs"):
+        detected_rows(aflw2000(tmp_path, Counter()), lambda bgr, limit: two[:0])
+
+
+def test_without_a_labelled_place_the_most_prominent_face_is_taken(tmp_path):
+    images = np.stack([np.zeros((4, 4, 3)), np.ones((4, 4, 3))]).astype(np.uint8)
+    np.savez(tmp_path / "b.npz", image=images, pose=np.stack([YPR, -YPR]))
+    photographs = biwi_npz(tmp_path / "b.npz", Counter())
+    rows, missed_deg = detected_rows(photographs, lambda bgr, limit: FACE[None][: limit if bgr.any() else 0])
     np.testing.assert_allclose(rows.ypr_deg, [-YPR])
-    with pytest.raises(DataError, match="no face found in 2 photographs"):
-        detected_rows(biwi_npz(tmp_path / "b.npz"), lambda bgr: None)
+    np.testing.assert_allclose(missed_deg, [YPR])
 
 
 def test_damaged_and_foreign_files_say_so(tmp_path):
+    left_out = Counter()
     with pytest.raises(DataError, match=r"no \*\.mat in it"):
-        list(aflw2000(tmp_path))
+        list(aflw2000(tmp_path, left_out))
     (tmp_path / "a.mat").write_bytes(b"no")
     with pytest.raises(DataError, match="no Pose_Para"):
-        list(aflw2000(tmp_path))
-    (tmp_path / "01").mkdir()
-    (tmp_path / "01" / "frame_00001_pose.txt").write_text("1 2 3\n4 5 6\n7 8 9\n")
+        list(aflw2000(tmp_path, left_out))
+    kinect(tmp_path, "1 2 3\n4 5 6\n7 8 9\n\n0 0 700\n")
     with pytest.raises(DataError, match="not a rotation"):
-        list(biwi(tmp_path))
+        list(biwi(tmp_path, left_out))
+    kinect(tmp_path, "1 2 3\n4 5 6\n")
+    with pytest.raises(DataError, match="expected 12 numbers"):
+        list(biwi(tmp_path, left_out))
     np.savez(tmp_path / "x.npz", image=np.array([{"pickled": 1}], dtype=object), pose=np.zeros((1, 3)))
-    with pytest.raises(DataError, match=r"expected an \.npz"):
-        list(biwi_npz(tmp_path / "x.npz"))
+    whole = (tmp_path / "x.npz").read_bytes()
+    for content in (whole, whole[:100], b"no", b""):
+        (tmp_path / "x.npz").write_bytes(content)
+        with pytest.raises(DataError, match=r"expected an \.npz"):
+            list(biwi_npz(tmp_path / "x.npz", left_out))

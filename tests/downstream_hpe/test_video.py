@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: MIT
+"""Pictures and videos through predict, with a stand-in for detector and model; the smoothing filter."""
+
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.face import FaceTracks
+from downstream_hpe.inputs import Source, find_sources
 from downstream_hpe.metrics import geodesic_errors
-from downstream_hpe.predicting import predictions, sources
+from downstream_hpe.predicting import Options, predictions
 from downstream_hpe.predictor import Pose
 from downstream_hpe.rotation import rotation_from_angles
 from downstream_hpe.smoothing import OneEuroFilter
+
+SHAPE = np.random.default_rng(0).uniform(-8, 8, size=(468, 3))
 
 
 def test_smoothing_calms_a_still_head_and_follows_a_turn():
@@ -29,49 +38,143 @@ def test_smoothing_calms_a_still_head_and_follows_a_turn():
         filtered(noisy[0], 0.0)
 
 
-class Brightness:
-    """Stands for a predictor: a face in every frame that is not black."""
+def at(x):
+    return SHAPE + np.array([x, 32, 0])
 
-    def landmarks(self, bgr):
-        return None if bgr.max() < 40 else np.random.default_rng(0).uniform(10, 50, size=(468, 3))
+
+class Spots:
+    """Stands for a predictor: a face at every column of bright pixels, whose yaw is where it is."""
+
+    def faces(self, bgr, limit):
+        columns = np.flatnonzero(bgr[32, :, 0] > 100)
+        starts = columns[np.diff(columns, prepend=-9) > 1]
+        return np.array([at(x + 5) for x in starts[:limit]]).reshape(-1, 468, 3)
 
     def from_landmarks(self, landmarks):
-        return Pose(np.array([[20.0, 10, 5]]), rotation_from_angles(np.array([[20.0, 10, 5]])))
+        ypr = np.stack([landmarks[:, :, 0].mean(1), landmarks[:, 0, 0] * 0, landmarks[:, 0, 0] * 0], axis=1)
+        return Pose(ypr, rotation_from_angles(ypr), np.full(len(ypr), 0.9))
+
+    def in_range(self, ypr_deg):
+        return bool(ypr_deg[0] < 50)
 
 
-@pytest.fixture
-def video(tmp_path):
+def frame(*xs):
+    image = np.zeros((64, 64, 3), dtype=np.uint8)
+    for x in xs:
+        image[:, x : x + 10] = 255
+    return image
+
+
+def write(path, frames):
     pytest.importorskip("cv2")
     from downstream_hpe.video import VideoWriter
 
-    with VideoWriter(tmp_path / "clip.mp4", 25.0) as writer:
-        for n in range(12):
-            writer.add(np.full((64, 64, 3), 0 if n == 5 else 200, dtype=np.uint8))
-    return tmp_path / "clip.mp4"
+    with VideoWriter(path, 25.0) as writer:
+        for image in frames:
+            writer.add(image)
+    return path
 
 
-def test_every_frame_of_a_video_has_a_record(video, tmp_path):
-    every = sources([str(video)])
-    records = list(predictions(every, Brightness(), tmp_path / "drawn", smooth=True))
-    assert [r["frame"] for r in records] == list(range(12))
-    assert [r["found"] for r in records] == [n != 5 for n in range(12)]
-    assert (records[6]["yaw_deg"], records[5]["yaw_deg"]) == (20.0, None)
-    assert records[3]["time_s"] == pytest.approx(3 / 25)
-    assert len(list(predictions(sources([str(tmp_path / "drawn")]), Brightness()))) == 12
-    assert len(list(predictions(every, Brightness(), frames=4))) == 4
+def test_every_frame_has_a_record_and_faces_keep_their_index(tmp_path):
+    # One stays, one comes from the right and passes below where the detector names it first.
+    frames = [frame(n * 2, 50 - n) if n != 5 else frame() for n in range(12)]
+    clip = write(tmp_path / "clip.mp4", frames)
+    options = Options(faces=2, drawn=tmp_path / "drawn", smooth=True)
+    every = find_sources([str(clip)])
+    records = list(predictions(every, Spots(), options))
+    assert [r["frame"] for r in records if not r["found"]] == [5]
+    assert [r["frame"] for r in records] == [f for f in range(12) for _ in range(1 if f == 5 else 2)]
+    for face, start, step in ((0, 0, 2), (1, 50, -1)):
+        mine = [r for r in records if r["face"] == face]
+        assert len(mine) == 11
+        expected = [start + step * n + SHAPE[:, 0].min() + 5 for n in range(12) if n != 5]
+        np.testing.assert_allclose([r["box_x"] for r in mine], expected, atol=2.01)
+    assert records[3]["time_s"] == pytest.approx(1 / 25)
+    assert records[0]["confidence"] == 0.9
+    drawn = list(predictions(find_sources([str(tmp_path / "drawn")]), Spots(), Options()))
+    assert len(drawn) == 12
+    assert {r["frame"] for r in predictions(every, Spots(), Options(frames=4))} == {0, 1, 2, 3}
 
 
-def test_a_video_cut_off_and_one_that_is_none(video, tmp_path):
-    (tmp_path / "cut.mp4").write_bytes(video.read_bytes()[:200])
+def test_a_face_seen_again_later_is_another_one_and_each_has_its_filter():
+    tracks = FaceTracks(smooth=True)
+    left, right = at(10), at(50)
+    assert tracks.indices(np.stack([left, right]), 0.0) == [0, 1]
+    assert tracks.indices(np.stack([right, left]), 0.1) == [1, 0]
+    assert tracks.indices(right[None], 0.2) == [1]
+    assert tracks.indices(np.stack([left, right]), 0.3) == [0, 1]
+    assert tracks.indices(np.empty((0, 468, 3)), 2.0) == []
+    assert tracks.indices(left[None], 2.1) == [2]
+    turn = rotation_from_angles(np.array([20.0, 0, 0]))
+    tracks.steady(2, np.eye(3), 2.1)
+    assert geodesic_errors(tracks.steady(2, turn, 2.2), turn) > 1
+    assert geodesic_errors(tracks.steady(3, turn, 2.2), turn) < 1e-6
+
+
+def test_a_video_cut_off_keeps_what_was_read(tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    # Motion JPEG in AVI, as cameras write it: readable up to where it ends.
+    writer = cv2.VideoWriter(str(tmp_path / "w.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 64))
+    for n in range(60):
+        writer.write(frame(n % 50))
+    writer.release()
+    whole = (tmp_path / "w.avi").read_bytes()
+    (tmp_path / "cut.avi").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "none.mp4").write_bytes(b"no video")
-    for name in ("cut.mp4", "none.mp4"):
-        with pytest.raises(DataError, match=f"{name}: cannot be opened as video"):
-            list(predictions([tmp_path / name], Brightness()))
+    (tmp_path / "head.mp4").write_bytes(write(tmp_path / "v.mp4", [frame(3)] * 9).read_bytes()[:200])
+    notes = []
+    every = find_sources([str(tmp_path / name) for name in ("cut.avi", "none.mp4", "head.mp4", "w.avi")])
+    records = list(predictions(every, Spots(), Options(), notes.append))
+    counts = [sum(r["input"].endswith(name) for r in records) for name in ("cut.avi", "w.avi")]
+    assert 20 < counts[0] < 60
+    assert counts[1] == 60
+    assert [note.split("/")[-1].split(":")[0] for note in notes] == ["cut.avi", "none.mp4", "head.mp4"]
+    assert f"ended after {counts[0]} of 60 frames" in notes[0]
+    assert "cannot be opened as video" in notes[1]
+
+
+def test_no_webcam_is_one_line():
+    pytest.importorskip("cv2")
+    if Path("/dev/video63").exists():
+        pytest.skip("there is a webcam 63")
+    notes = []
+    assert not list(predictions([Source(63, Path("w.mp4"))], Spots(), Options(), notes.append))
+    assert notes == ["webcam:63: there is no such webcam, or another program uses it"]
+
+
+def test_folders_with_other_files_and_the_same_names(tmp_path):
+    for name in ("a.jpg", "a.png", "b/a.jpg", "b/c/x.PNG", ".cache/y.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        Image.fromarray(frame(20)).save(tmp_path / name)
+    (tmp_path / "b" / "notes.txt").write_text("no picture")
+    (tmp_path / "b" / "broken.png").write_bytes(b"\x89PNG no")
+    drawn = tmp_path / "drawn"
+    for _ in range(2):  # the second time, drawn copies lie below the input
+        notes = []
+        every = find_sources([str(tmp_path)], drawn, notes.append)
+        records = list(predictions(every, Spots(), Options(drawn=drawn), notes.append))
+        assert [Path(r["input"]).name for r in records] == ["a.jpg", "a.png", "a.jpg", "x.PNG"]
+        copies = sorted(str(f.relative_to(drawn)) for f in drawn.rglob("*.*"))
+        assert copies == ["a-2.png", "a.png", "b/a.png", "b/c/x.png"]
+        assert len(notes) == 2
+        assert "1 files that are no picture or video skipped (b/notes.txt)" in notes[0]
+        assert notes[1].endswith("broken.png: not a readable picture")
 
 
 def test_inputs_that_are_none(tmp_path):
-    assert sources(["webcam:2"]) == [2]
+    assert find_sources(["webcam:2"])[0].path == 2
     with pytest.raises(UsageError, match="expected a number"):
-        sources(["webcam:front"])
+        find_sources(["webcam:front"])
     with pytest.raises(UsageError, match="no picture or video in it"):
-        sources([str(tmp_path)])
+        find_sources([str(tmp_path)])
+    Image.fromarray(frame(3)).save(tmp_path / "a.png")
+    with pytest.raises(UsageError, match=r"a\.png: --draw would overwrite it"):
+        find_sources([str(tmp_path / "a.png")], tmp_path)
+
+
+def test_a_copy_that_cannot_be_written(tmp_path):
+    (tmp_path / "drawn").write_text("a file")
+    Image.fromarray(frame(3)).save(tmp_path / "a.png")
+    every = find_sources([str(tmp_path / "a.png")])
+    with pytest.raises(DataError, match=r"drawn.*cannot be written"):
+        list(predictions(every, Spots(), Options(drawn=tmp_path / "drawn")))

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Which rows `downstream-hpe evaluate` scores, and which estimators on them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from downstream_hpe.errors import DataError
+from downstream_hpe.evaluation import BOUNDS_DEG, Estimator, constant_zero, rigid_fit, within_bounds
+from downstream_hpe.fitting import estimators
+from downstream_hpe.photographs import FORMATS, detected_rows
+from downstream_hpe.predictor import Predictor, model_folder
+from downstream_hpe.tables import Rows, read_missed, read_rows
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """rows: with a face. missed_deg: float64 [M, 3], (yaw, pitch, roll) of those without one."""
+
+    rows: Rows
+    missed_deg: np.ndarray
+
+
+def dataset_rows(predictor: Predictor, dataset: Path, split: str | None, note: Note) -> Measured:
+    """The rows of a dataset whose subjects the model was not trained on. DataError: no such rows."""
+    rows = read_rows(dataset, split)
+    subjects, missed_deg = read_missed(dataset, split)
+    trained = sorted(predictor.trained_subjects)
+    unseen = ~np.isin(rows.subjects, trained)
+    if not unseen.any():
+        raise DataError(f"{dataset}: the model was trained on every subject in it; give other heads")
+    if not unseen.all():
+        note(f"{len(np.unique(rows.subjects[~unseen]))} subjects the model was trained on left out")
+    return Measured(rows.take(unseen), missed_deg[~np.isin(subjects, trained)])
+
+
+def photograph_rows(predictor: Predictor, path: Path, layout: str, note: Note) -> Measured:
+    """The labelled photographs of a folder or file in which the labelled face is found.
+
+    layout: a key of :data:`downstream_hpe.photographs.FORMATS`.
+
+    Raises
+    ------
+    DataError: as the format's loader; no face found.
+    """
+    left_out: Counter[str] = Counter()
+    rows, missed_deg = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
+    for reason, count in left_out.items():
+        note(f"{count} photographs left out: {reason}")
+    return Measured(rows, missed_deg)
+
+
+def bounded(measured: Measured, path: Path, note: Note) -> Measured:
+    """Only the rows in the paper's bounds. DataError: none there."""
+    inside = within_bounds(measured.rows.ypr_deg)
+    bounds = ", ".join(f"{bound:g}" for bound in BOUNDS_DEG)
+    if not inside.any():
+        raise DataError(f"{path}: no pose within {bounds} degrees; use --all")
+    if not inside.all():
+        note(f"{int((~inside).sum())} rows outside {bounds} degrees left out")
+    return Measured(measured.rows.take(inside), measured.missed_deg[within_bounds(measured.missed_deg)])
+
+
+def model_estimators(model: str, predictor: Predictor, reference: np.ndarray | None) -> dict[str, Estimator]:
+    """The model beside its baselines, by name; of a single .onnx file, beside those that need no more.
+
+    predictor: the model's.
+
+    reference: as :func:`downstream_hpe.fitting.estimators`.
+    """
+    folder = model_folder(model)
+    if folder is not None:
+        return estimators(folder, reference)
+    every: dict[str, Estimator] = {"constant zero": constant_zero}
+    if reference is not None:
+        every["rigid fit to reference face"] = rigid_fit(reference)
+    every["encoder + heads"] = lambda landmarks: predictor.from_landmarks(landmarks).ypr_deg
+    return every

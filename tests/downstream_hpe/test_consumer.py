@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Reading tables, estimating and evaluating need neither generator, Blender nor detector, nor torch."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import ideal
+import numpy as np
+import pytest
+from tiny_onnx import tiny_model
+
+pytest.importorskip("onnxruntime")
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# None in sys.modules makes an import fail, as if the package were not installed.
+PROGRAM = """
+import sys
+for name in ("generator", "bpy", "mediapipe", "cv2", "torch", "onnx"):
+    sys.modules[name] = None
+import numpy as np
+from downstream_hpe import cli, detector, inputs, measuring, predicting, records, reference, tensor, video
+from downstream_hpe.errors import ModelError
+from downstream_hpe.predictor import Predictor
+predictor = Predictor.load("m.onnx")
+rows = measuring.dataset_rows(predictor, "d", None, print).rows
+print(len(rows), predictor.from_landmarks(rows.landmarks).ypr_deg.shape)
+for need in (lambda: predictor.from_image(np.zeros((9, 9, 3), dtype=np.uint8)), lambda: video.VideoReader(0)):
+    try:
+        need()
+    except ModelError as error:
+        print(error)
+"""
+
+
+def test_without_everything_else(tmp_path):
+    (tmp_path / "m.onnx").write_bytes(tiny_model().SerializeToString())
+    ideal.write(tmp_path / "d" / "part.parquet", ideal.rows(np.zeros((468, 3)), "nobody"))
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{PROGRAM}"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [
+        "125 (125, 3)",
+        "mediapipe 0.10.21 is not installed: pip install 'headturn[pose]', on Python 3.10 to 3.12",
+        "OpenCV is not installed: pip install 'headturn[pose]', on Python 3.10 to 3.12",
+    ]
