@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import shutil
 import subprocess
@@ -94,7 +95,9 @@ def _python(package: str) -> list[str]:
 def run(command: list[str]) -> str:
     """Run a command of this repository from its root; its standard output."""
     print("+", shlex.join(command), flush=True)
-    return subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout
+    # One thread adds in one order, so that the same data give the same weights.
+    alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(command, check=True, cwd=ROOT, env=alone, stdout=subprocess.PIPE, text=True).stdout
 
 
 def build(one: Build, folder: Path, scale: float, others: str | None = None) -> Path:
@@ -126,7 +129,6 @@ def main() -> None:
     training = [build(one, work, given.scale) for one in TRAINING]
     model = work / "model"
     fit = [*_python("downstream_hpe"), "fit", str(grid), "--out", str(model), "--holes", "mask", "--json"]
-    # One thread adds in one order, so that the same data give the same weights.
     fit += ["--threads", "1"]
     fit += [word for path in training for word in ("--extra", str(path))]
     card = json.loads(run(fit + (["--epochs", str(given.epochs)] if given.epochs else [])))
