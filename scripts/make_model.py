@@ -74,7 +74,17 @@ LOOKS = (
     f"{CLOSER} --lens 100 --light=-60,30 --background 0.05,0.05,0.05",
     f"{WIDER} --lens 50 --light=35,50 --background 0.7,0.75,0.85",
 )
-TRAINING = tuple(Build(f"train{k}", 16, 1000 + k, 3, 44, look) for k, look in enumerate(LOOKS, 1))
+MORE_LOOKS = (
+    f"{WIDER} --lens 60 --light=20,25 --background 0.4,0.4,0.4",
+    f"{WIDER} --lens 40 --light=-30,45 --background 0.75,0.7,0.65",
+    f"{WIDER} --lens 90 --light=5,35 --background 0.2,0.25,0.2",
+    f"{WIDER} --lens 28 --light=40,30 --background 0.95,0.95,0.95",
+)
+TRAINING = (
+    *(Build(f"train{k}", 16, 1000 + k, 3, 44, look) for k, look in enumerate(LOOKS, 1)),
+    # What a scan gains from most is more identities, so these are many and seen less often.
+    *(Build(f"train{k}", 48, 1000 + k, 1, 22, look) for k, look in enumerate(MORE_LOOKS, len(LOOKS) + 1)),
+)
 BEYOND_RANGE = "beyond the range"
 TESTS = {
     "Parametric heads it has never seen, on a grid": Build(
