@@ -17,7 +17,7 @@ import numpy as np
 
 from downstream_hpe.confidence import Confidence, calibrate, level_faces
 from downstream_hpe.decomposition import PAPER_RANKS, Ranks, decompose
-from downstream_hpe.errors import UsageError
+from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.evaluation import (
     ANGLES,
     Estimator,
@@ -28,7 +28,7 @@ from downstream_hpe.evaluation import (
     split_subjects,
     within_bounds,
 )
-from downstream_hpe.manifold import plot_manifolds
+from downstream_hpe.manifold import MIN_SAMPLES, plot_manifolds
 from downstream_hpe.model import Progress, TensorModel
 from downstream_hpe.normalise import Normalisation, normalise
 from downstream_hpe.predictor import MODEL_FILE, Predictor
@@ -103,7 +103,6 @@ def fit(
     trained, held_out = _subjects(every, settings)
     rows = Rows.joined([read_rows(path) for path in every])
     mine, theirs = (rows.take(np.isin(rows.subjects, sorted(some))) for some in (trained, held_out))
-    folder.mkdir(parents=True, exist_ok=True)
     model, card = _tensor_model(dataset, trained, mean_face(mine), settings, folder, note)
     note(f"{len(mine)} faces of {len(trained)} subjects; held out: {len(theirs)} of {len(held_out)}")
 
@@ -147,6 +146,8 @@ def _tensor_model(
         subjects=trained,
         expression=settings.expression,
     )
+    _check_size(dataset, tensor.shape, settings.ranks)
+    folder.mkdir(parents=True, exist_ok=True)
     note(f"tensor {' x '.join(map(str, tensor.shape))}; {tensor.report.text()}")
 
     def round_done(number: int, error: float) -> None:
@@ -169,6 +170,22 @@ def _tensor_model(
         "relative_error": fit.relative_error,
         "energies": {axis: values[:6].tolist() for axis, values in energies},
     }
+
+
+def _check_size(dataset: Path, shape: tuple[int, ...], ranks: tuple[int, int, int, int]) -> None:
+    """DataError, with a way out, where a grid is too small for the ranks or for its curves."""
+    heads, *angles = shape[:4]
+    if heads < ranks[0]:
+        raise DataError(
+            f"{dataset}: {heads} heads to learn from besides those held out, too few for identity rank "
+            f"{ranks[0]}; build more heads, or give --ranks {heads},{','.join(map(str, ranks[1:]))}"
+        )
+    for name, size, rank in zip(ANGLES, angles, ranks[1:], strict=True):
+        if size < max(rank, MIN_SAMPLES):
+            raise DataError(
+                f"{dataset}: {size} {name} angles on the grid, expected at least {max(rank, MIN_SAMPLES)}; "
+                f"build with a finer step or a wider range of {name}"
+            )
 
 
 def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:

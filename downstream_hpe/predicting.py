@@ -104,5 +104,5 @@ def _faces(
         rotation = tracks.steady(index, pose.rotation[n].astype(np.float64), time_s)
         ypr_deg = angles_from_rotation(rotation)
         confidence = None if pose.confidence is None else float(pose.confidence[n])
-        faces.append(Face(index, found[n], rotation, ypr_deg, confidence, predictor.in_range(ypr_deg)))
+        faces.append(Face(index, found[n], rotation, ypr_deg, confidence, bool(predictor.in_range(ypr_deg))))
     return sorted(faces, key=lambda face: face.index)

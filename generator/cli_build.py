@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from generator.console import EXIT_INCOMPLETE, JsonFlag, err, out
+from generator.console import EXIT_INCOMPLETE, JsonFlag, err, out, plural
 from generator.errors import HeadturnError
 from generator.plan.config import BuildConfig
 from generator.reporter import JsonReporter, TerminalReporter
@@ -96,16 +96,16 @@ def _print_result(result: Any, seconds: float, as_json: bool) -> None:
         typer.echo(json.dumps({"event": "finished", **facts}))
         return
     lines = [
-        f"{manifest.rows} rows of {manifest.heads} heads in {seconds:.0f} s; a face was found in {rate:.1%}",
+        f"{plural(manifest.rows, 'row')} of {plural(manifest.heads, 'head')} in {seconds:.0f} s; "
+        f"a face was found in {rate:.1%}",
         f"tables    {result.root / 'data'}",
         *(f"picture   {path}" for path in result.pictures),
         f"read      pandas.read_parquet({str(result.root / 'data')!r})",
         f"check     headturn verify {result.root}",
     ]
-    if not result.complete:
-        lines.append(
-            f"left out  {len(result.skipped)} heads and {result.failed_units} units: "
-            f"see {result.root / 'manifest.json'} and failures.jsonl"
-        )
+    if result.skipped:
+        lines.append(f"left out  {plural(len(result.skipped), 'head')}: see {result.root / 'manifest.json'}")
+    if result.failed_units:
+        lines.append(f"left out  {plural(result.failed_units, 'unit')}: see {result.root / 'failures.jsonl'}")
     for line in lines:
         out.print(line, highlight=False, markup=False, soft_wrap=True)

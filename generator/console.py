@@ -16,4 +16,10 @@ EXIT_INCOMPLETE = 3
 out = Console(width=None if sys.stdout.isatty() else 160)
 err = Console(stderr=True)
 
+
+def plural(count: int, noun: str) -> str:
+    """A number and its noun: "1 head", "2 heads"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 JsonFlag = Annotated[bool, typer.Option("--json", help="JSON on stdout, for machines.")]

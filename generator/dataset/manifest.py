@@ -130,6 +130,8 @@ def read_manifest(root: Path) -> Manifest:
     or it contradicts itself.
     """
     path = root / MANIFEST_FILE
+    if not root.is_dir():
+        raise DatasetError(f"{root}: no such folder; give the folder that `headturn build --out` wrote")
     if not path.is_file():
         raise DatasetError(
             f"{root}: not a Headturn dataset, or its build did not finish (no {MANIFEST_FILE}); "

@@ -58,15 +58,20 @@ def claim(root: Path) -> None:
 
 
 def check_configuration(config: BuildConfig, root: Path) -> bool:
-    """May this configuration be built in root? Returns whether a dataset is there already.
+    """May this configuration be built in root? Returns whether a dataset of it is there already.
 
-    Raises DatasetError, with what differs, if it holds one whose rows would be others.
+    Where nothing was rendered yet, because a first try failed on its heads, any configuration may.
+    Raises DatasetError, with what differs, if root holds a dataset whose rows would be others.
     """
     mark = root / CONFIG_FILE
     if not mark.is_file():
         return False
     changed = differences(config, load_config(mark, {}))
     changed = [what for what in changed if what.split(":")[0] not in MAY_GROW]
+    if changed and not (root / POSES_FILE).exists():
+        if (root / MADE_HEADS).is_dir():
+            shutil.rmtree(root / MADE_HEADS)
+        return False
     if changed:
         raise DatasetError(
             f"{root} already holds a dataset of another configuration ({'; '.join(changed)}); "

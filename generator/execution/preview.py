@@ -20,6 +20,7 @@ from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.plan.config import BuildConfig
+from generator.process import native_silence
 
 DOT = (80, 255, 80)
 
@@ -59,7 +60,7 @@ def render_preview(
         )
     head = next((h for h in source.heads if h.expression == NEUTRAL), source.heads[0])
     settings = config.render.settings()
-    with scratch_folder() as scratch:
+    with scratch_folder() as scratch, native_silence():  # MediaPipe's start-up notes
         renderer = Renderer(scratch, scratch / "render.log", blender=blender)
         detector = MediaPipeFaceMesh(config.landmarks.min_confidence)
         try:

@@ -159,4 +159,6 @@ def test_a_grid_too_coarse_is_refused(tmp_path, monkeypatch, capsys):
     for n, face in enumerate(ideal.Faces().draw(8, np.random.default_rng(1))):
         ideal.write(tmp_path / "d" / f"{n}.parquet", ideal.rows(face, f"s{n}", axes))
     assert run("fit", tmp_path / "d", "--out", tmp_path / "m", monkeypatch=monkeypatch) == 1
-    assert "3 angles are too few for a cosine" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "3 yaw angles on the grid, expected at least 4" in error
+    assert "finer step or a wider range of yaw" in error

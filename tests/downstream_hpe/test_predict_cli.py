@@ -74,6 +74,8 @@ def test_folder_with_everything(shipped, photograph, tmp_path, monkeypatch, capf
     assert left == pytest.approx(rows[3]["box_x"], abs=8)
     assert right - 512 == pytest.approx(rows[3]["box_x"], abs=8)
     assert {f.name for f in drawn.rglob("*.png")} == {"astronaut.png", "black.png", "both.png"}
+    assert run("predict", pictures / "deep", "--json", monkeypatch=monkeypatch) == 0
+    assert json.loads(capfd.readouterr().out) == rows[3]
 
 
 def test_small_faces_are_found_and_placed_as_well_as_large_ones(photograph):

@@ -14,7 +14,7 @@ from small_builds import Quiet, config_for, run
 
 from generator.dataset.manifest import MANIFEST_FILE, read_manifest
 from generator.dataset.verify import verify_dataset
-from generator.errors import DatasetError, HeadError
+from generator.errors import DatasetError, HeadError, UsageError
 from generator.execution.build import build
 from generator.execution.local import LocalExecutor
 from generator.execution.open_executor import open_executor
@@ -102,6 +102,9 @@ def test_a_mesh_without_a_face_is_refused(tmp_path: Path) -> None:
     trimesh.creation.icosphere(radius=100).export(tmp_path / "ball" / "ball.obj")
     with pytest.raises(HeadError, match="no face was found from the front"):
         run(config_for(tmp_path / "ball", heads={"up": "+Y", "forward": "+Z"}), tmp_path / "dataset")
+    # Nothing was rendered, so the folder is free for the next try, which says what is wrong with itself.
+    with pytest.raises(UsageError, match="nowhere"):
+        run(config_for(tmp_path / "nowhere"), tmp_path / "dataset")
 
 
 def test_axes_and_units_are_found(parametric_heads: Path, tmp_path: Path) -> None:
