@@ -91,7 +91,11 @@ def _mixed(colour: tuple[int, int, int], faded: float) -> tuple[int, ...]:
 
 def _label(draw: ImageDraw.ImageDraw, face: Face, scale: int, size: tuple[int, int], numbered: bool) -> None:
     left, top, width, height = (side * scale for side in face.box)
-    lines = ["  ".join(f"{n} {a:+.0f}°" for n, a in zip(("yaw", "pitch", "roll"), face.ypr_deg, strict=True))]
+    lines = [
+        "  ".join(
+            f"{n} {round(float(a)):+d}°" for n, a in zip(("yaw", "pitch", "roll"), face.ypr_deg, strict=True)
+        )
+    ]
     if numbered:
         lines[0] = f"#{face.index}  {lines[0]}"
     if face.confidence is not None:

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont, UnidentifiedImageError
 
-from generator.dataset.detection import tally_detection
+from generator.dataset.detection import MAX_CELLS, tally_detection
 from generator.dataset.files import write_bytes
 from generator.dataset.heads_table import HeadRow, read_heads
 from generator.dataset.manifest import POSES_FILE, Manifest
@@ -35,7 +36,8 @@ def contact_sheet(dataset: Path, manifest: Manifest, out: Path) -> Path:
     Heads, poses.csv and the parts must be there; the manifest may not be written yet. Returns out.
     Raises DatasetError: the dataset has no images, or lacks a file.
     """
-    return _sheet(dataset, manifest, out, TILE, _mark_detected, lambda head: head.expression)
+    legend = [("landmarks found", DOT)]
+    return _sheet(dataset, manifest, out, TILE, _mark_detected, lambda head: head.expression, legend)
 
 
 def anchor_sheet(dataset: Path, manifest: Manifest, out: Path) -> Path:
@@ -46,9 +48,10 @@ def anchor_sheet(dataset: Path, manifest: Manifest, out: Path) -> Path:
 
     def quality(head: HeadRow) -> str:
         lost = f", {head.anchor_absent} absent" if head.anchor_absent else ""
-        return f"{head.anchor_residual_px:.1f} px{lost}" if head.anchor_views else "no anchors"
+        return f"rms {head.anchor_residual_px:.1f} px{lost}" if head.anchor_views else "no anchors"
 
-    return _sheet(dataset, manifest, out, ANCHOR_TILE, _mark_exact, quality)
+    legend = [("exact, seen", DOT), ("exact, hidden", MISS)]
+    return _sheet(dataset, manifest, out, ANCHOR_TILE, _mark_exact, quality, legend)
 
 
 def _sheet(
@@ -58,8 +61,12 @@ def _sheet(
     side: int,
     mark: Callable[[ImageDraw.ImageDraw, dict, HeadRow, int], None],
     caption: Callable[[HeadRow], str],
+    legend: list[tuple[str, str]],
 ) -> Path:
-    """mark(draw, row, head, side) draws onto a tile of that side; caption stands below the subject."""
+    """mark(draw, row, head, side) draws onto a tile of that side; caption stands below the subject.
+
+    legend: what a colour means, in the corner.
+    """
     if manifest.images == "none":
         raise DatasetError(
             f"{dataset}: built with images = none, so there is nothing to show; build with files or embedded"
@@ -79,6 +86,10 @@ def _sheet(
             x = LEFT + column * (side + GAP) + side * (2 * place + 1) / 6
             draw.text((x, 12), name, FAINT, small, anchor="mm")
             draw.text((x, 28), f"{angle:.1f}".removesuffix(".0") + "°", INK, font, anchor="mm")
+    for line, (what, color) in enumerate(legend):
+        y = 8 + 12 * line
+        draw.rectangle((GAP, y - 3, GAP + 6, y + 3), fill=color)
+        draw.text((GAP + 11, y), what, FAINT, ImageFont.load_default(11), anchor="lm")
     for line, head in enumerate(heads):
         top = TOP + line * (side + GAP)
         draw.text((GAP, top + side / 2 - 10), _fit(draw, head.subject, font), INK, font, anchor="lm")
@@ -108,7 +119,7 @@ def detection_map(dataset: Path, manifest: Manifest, out: Path) -> Path:
     cells = tally.by_cell()
     if not cells:
         raise DatasetError(f"{dataset}: no rows to count; run `headturn build` again")
-    yaws, pitches = sorted({cell.yaw_deg for cell in cells}), sorted({cell.pitch_deg for cell in cells})
+    yaws, pitches = _even(cell.yaw_deg for cell in cells), _even(cell.pitch_deg for cell in cells)
     rates = np.full((len(pitches), len(yaws)), np.nan)
     for cell in cells:
         rates[pitches.index(cell.pitch_deg), yaws.index(cell.yaw_deg)] = 100 * cell.rate
@@ -131,6 +142,19 @@ def detection_map(dataset: Path, manifest: Manifest, out: Path) -> Path:
     figure.savefig(png, format="png", metadata={"Software": None})
     write_bytes(out, png.getvalue())
     return out
+
+
+def _even(values: Iterable[float]) -> list[float]:
+    """Distinct values in order, with those between that nothing fell on, so that a map keeps its scale."""
+    found = sorted(set(values))
+    if len(found) < 3:
+        return found
+    step = min(b - a for a, b in pairwise(found))
+    places = [(value - found[0]) / step for value in found]
+    if places[-1] > MAX_CELLS or any(abs(place - round(place)) > 1e-6 for place in places):
+        return found
+    known = {round(place): value for place, value in zip(places, found, strict=True)}
+    return [known.get(k, found[0] + k * step) for k in range(round(places[-1]) + 1)]
 
 
 def shown_poses(plan: PosePlan) -> list[int]:
