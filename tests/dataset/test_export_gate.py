@@ -238,7 +238,7 @@ def test_the_command(dataset, tmp_path, monkeypatch, capsys):
     assert headturn("export", dataset, "--format", "tape", "--out", out) == 2
     assert headturn("export", tmp_path / "nowhere", "--format", "coco", "--out", tmp_path / "o") == 1
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("headturn: ")]
-    assert len(errors) == 1 and "not a Headturn dataset" in errors[0]
+    assert len(errors) == 1 and "no such folder" in errors[0]
 
 
 def test_choices_of_the_command_are_the_formats():
