@@ -275,6 +275,8 @@ def test_a_changed_side_table(dataset):
 
 def test_not_a_dataset(tmp_path):
     report = verify_dataset(tmp_path / "nowhere")
+    assert not report.ok and "no such folder" in report.text()
+    report = verify_dataset(tmp_path)
     assert not report.ok and "run `headturn build` again" in report.text()
 
 
