@@ -49,7 +49,7 @@ bench: $(VENV)/.dev
 bench-addon: $(VENV)/.dev
 	$(BIN)/python benchmarks/addon.py
 
-# The shipped model from nothing: hours. MODEL_FLAGS="--scale 0.05 --epochs 2 --models out" tries it out.
+# The shipped model from nothing: a long run that continues where it stopped. MODEL_FLAGS="--scale 0.05 --epochs 2 --models out" tries it out.
 model: $(VENV)/.dev
 	$(BIN)/python scripts/make_model.py --work model-work $(MODEL_FLAGS)
 

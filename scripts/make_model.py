@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the model that is shipped: build its data, fit it, measure it, write the graph and its card.
 
-    python scripts/make_model.py --work model-work                   # an hour or two on two cores
+    python scripts/make_model.py --work model-work                   # all of it: a long run
     python scripts/make_model.py --work /tmp/small --scale 0.05 --epochs 2 --models /tmp/small/models
 
 Run again after an interruption, it goes on where it stopped. With --others it also measures on the

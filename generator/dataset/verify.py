@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -69,6 +70,10 @@ def verify_dataset(
     workers: processes; default one a core, where there is enough to do.
     progress: called with (parts done, parts in all).
     Never raises for what is wrong with the dataset: every problem is a line of the report.
+
+    Raises
+    ------
+    DatasetError: a process that was checking parts was killed.
     """
     root = Path(path)
     checks = {name: Check(name) for name in (QUICK_CHECKS if quick else CHECKS)}
@@ -172,8 +177,14 @@ def _findings(
     if workers < 2:
         yield map(checker.quick if quick else checker.check, parts)
         return
-    with ProcessPoolExecutor(workers, get_context("spawn"), _open, (root,)) as pool:
-        yield pool.map(partial(_check, quick=quick), parts, chunksize=CHUNK)
+    try:
+        with ProcessPoolExecutor(workers, get_context("spawn"), _open, (root,)) as pool:
+            yield pool.map(partial(_check, quick=quick), parts, chunksize=CHUNK)
+    except BrokenProcessPool as error:
+        raise DatasetError(
+            f"{root}: a process that was checking it was killed, perhaps for memory; nothing was changed. "
+            "Run it again with --workers 1"
+        ) from error
 
 
 _checker: PartChecker

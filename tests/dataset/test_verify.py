@@ -4,10 +4,13 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -17,6 +20,7 @@ from generator.dataset.heads_table import read_heads, write_heads
 from generator.dataset.manifest import read_manifest, write_manifest
 from generator.dataset.part import check_part, read_part
 from generator.dataset.verify import VerifyReport, verify_dataset
+from generator.errors import DatasetError
 from generator.plan.poses import sobol_plan
 
 PART = "data/train/part-s1-0.parquet"
@@ -66,6 +70,24 @@ def test_several_processes_find_the_same(build, tmp_path):
     alone, together = verify_dataset(root, workers=1), verify_dataset(root, workers=2)
     assert not alone.ok
     assert together.as_dict() == alone.as_dict()
+
+
+def test_a_killed_process_is_one_line(build, tmp_path):
+    build(tmp_path / "d", "none")
+
+    def kill_the_first() -> None:
+        for _ in range(1000):
+            for child in psutil.Process().children():
+                if any("multiprocessing-fork" in word for word in child.cmdline()):
+                    child.kill()
+                    return
+            time.sleep(0.01)
+
+    killer = threading.Thread(target=kill_the_first)
+    killer.start()
+    with pytest.raises(DatasetError, match=r"was killed.*--workers 1"):
+        verify_dataset(tmp_path / "d", workers=2)
+    killer.join()
 
 
 def test_quick_reads_no_rows_and_says_so(build, tmp_path):
