@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import contextlib
 import json
-import sys
 import time
-from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from downstream_hpe.errors import DataError, HpeError, UsageError
+from downstream_hpe.console import note, one_line_errors, progress
+from downstream_hpe.errors import DataError, UsageError
 
 app = typer.Typer(
     help="Learn pose manifolds from Headturn's tables and estimate head pose.",
@@ -27,8 +24,6 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-out = Console()
-err = Console(stderr=True)
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output on stdout.")]
 
@@ -115,13 +110,13 @@ def fit(
         expression=expression,
         threads=threads,
     )
-    with _progress() as bar:
+    with progress() as bar:
         task = bar.add_task("training", total=None, loss="")
 
         def advance(done: int, total: int, loss: float) -> None:
             bar.update(task, completed=done, total=total, loss=f"loss {loss:.4f}")
 
-        fitted = run_fit(dataset, model, settings, _note, advance)
+        fitted = run_fit(dataset, model, settings, note, advance)
     if as_json:
         typer.echo(json.dumps({"model": str(model), **fitted.card}, sort_keys=True))
         return
@@ -155,20 +150,22 @@ def evaluate(
     from downstream_hpe.predictor import Predictor
     from downstream_hpe.reference import load_reference
 
+    if report is not None and report.exists() and not report.is_dir():
+        raise UsageError(f"{report}: --out takes a folder, and this is a file")
     predictor = Predictor.load(model)
     face = None if reference is None else load_reference(reference)
     every = measuring.model_estimators(model, predictor, face)
     if layout is LayoutName.headturn:
-        measured = measuring.dataset_rows(predictor, dataset, split, _note)
+        measured = measuring.dataset_rows(predictor, dataset, split, note)
     else:
-        measured = measuring.photograph_rows(predictor, dataset, layout.value, _note)
+        measured = measuring.photograph_rows(predictor, dataset, layout.value, note)
         predictor.close()
     if bounded:
-        measured = measuring.bounded(measured, dataset, _note)
+        measured = measuring.bounded(measured, dataset, note)
     rows, missed = measured.rows, misses.misses(measured.rows.ypr_deg, measured.missed_deg)
     undetected = len(measured.missed_deg)
     if undetected:
-        _note(f"no face found in {undetected} of {undetected + len(rows)} rows; they are not in the errors")
+        note(f"no face found in {undetected} of {undetected + len(rows)} rows; they are not in the errors")
     found = compare(rows, every)
     tables = [ev.markdown(found)]
     said = predictor.from_landmarks(rows.landmarks).confidence
@@ -177,17 +174,21 @@ def evaluate(
     if any(m.missed for m in missed):
         tables.append(misses.markdown(missed))
     if report is not None:
+        from downstream_hpe.plots import write_plots
+
         report.mkdir(parents=True, exist_ok=True)
         (report / "errors.md").write_text("\n".join(tables), encoding="utf-8")
         ev.write_csv(found, report / "errors.csv")
         misses.write_csv(missed, report / "misses.csv")
-        ev.plot_intervals(found, report / "error_by_interval.png")
-        ev.plot_distribution(found, report / "error_distribution.png")
-        _note(f"tables and plots: {report}")
+        write_plots(found, report)
+        note(f"tables and plots: {report}")
     if as_json:
-        typer.echo(json.dumps([{**summary(e), "undetected": undetected} for e in found]))
+        counts = {"undetected": undetected, "damaged": measured.damaged}
+        typer.echo(json.dumps([{**summary(e), **counts} for e in found]))
     else:
         typer.echo("\n".join(tables))
+    if measured.damaged:
+        raise typer.Exit(3)
 
 
 @app.command(epilog="Example: downstream-hpe predict photo.jpg --draw drawn")
@@ -198,7 +199,8 @@ def predict(
     ] = "headturn",
     table: Annotated[Path | None, typer.Option("--out", help="Write a .csv or .parquet file.")] = None,
     drawn: Annotated[
-        Path | None, typer.Option("--draw", help="Folder for pictures and videos with axes and angles.")
+        Path | None,
+        typer.Option("--draw", help="Folder for copies with axes and angles; of one input a file, too."),
     ] = None,
     faces: Annotated[int, typer.Option(min=1, help="At most so many faces a picture or frame.")] = 1,
     smooth: Annotated[bool, typer.Option(help="One-euro filter on video.")] = False,
@@ -217,13 +219,13 @@ def predict(
         left_out.append(line)
         if alone and not images:
             raise DataError(line)
-        _note(line)
+        note(line)
 
     alone, images, with_face = False, 0, 0
     every = find_sources(inputs, drawn, leave_out)
     alone = len(every) == 1
     predictor = Predictor.load(model)
-    options = Options(faces, drawn, smooth, frames)
+    options = Options(faces, smooth, frames)
     last, stopped = None, False
     began = ended = 0.0
     with contextlib.ExitStack() as stack:
@@ -240,12 +242,15 @@ def predict(
                     last = (row["input"], row["frame"])
                 if writer is not None:
                     writer.add(row)
-                typer.echo(json.dumps(row) if as_json else text(row))
+                typer.echo(json.dumps(row) if as_json else text(row, faces > 1))
         except KeyboardInterrupt:
             stopped = True
     # From the first to the last, without the start of the detector.
     rate = f", {(images - 1) / (ended - began):.1f} a second" if images > 1 else ""
-    _note(f"a face in {with_face} of {images} pictures and frames{rate}")
+    if images:
+        note(f"a face in {with_face} of {images} pictures and frames{rate}")
+        if drawn is not None:
+            note(f"drawn: {drawn if len(every) > 1 else every[0].copy}")
     if stopped and not any(isinstance(source.path, int) for source in every):
         raise typer.Exit(130)
     if not images:
@@ -295,47 +300,9 @@ def _ranks(text: str) -> tuple[int, int, int, int]:
     return identity, yaw, pitch, roll
 
 
-def _note(text: str) -> None:
-    err.print(text, highlight=False, markup=False, soft_wrap=True)
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[loss]}"),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=err,
-        disable=not err.is_terminal,
-    )
-
-
-@contextlib.contextmanager
-def _one_line_errors() -> Iterator[None]:
-    try:
-        yield
-    except HpeError as error:
-        err.print(f"downstream-hpe: {error}", style="red", highlight=False, markup=False, soft_wrap=True)
-        sys.exit(error.exit_code)
-    except ModuleNotFoundError as error:
-        # The learning side is an extra of the distribution.
-        if error.name not in ("torch", "onnx", "onnxruntime", "safetensors"):
-            raise
-        _note(f"downstream-hpe: {error.name} is not installed: pip install 'headturn[hpe]'")
-        sys.exit(1)
-    except OSError as error:
-        _note(f"downstream-hpe: {error}")
-        sys.exit(1)
-    except KeyboardInterrupt:
-        _note("downstream-hpe: stopped; run the same command again to continue")
-        sys.exit(130)
-
-
 def main() -> None:
     """Entry point of the console script."""
-    with _one_line_errors():
+    with one_line_errors():
         app()
 
 

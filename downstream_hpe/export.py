@@ -15,12 +15,11 @@ from scipy.linalg import block_diag
 from torch import nn
 
 from downstream_hpe.confidence import BEYOND_DEG, TURNS, Confidence
+from downstream_hpe.graph import IR_VERSION, OPSET
 from downstream_hpe.model import packed
 from downstream_hpe.networks import PoseNetwork, Weights
 from downstream_hpe.normalise import EYE_A, EYE_B, FEATURES, ORIGIN, POINTS, Normalisation
 from downstream_hpe.predictor import FORMAT
-
-OPSET = 17
 
 
 class _Graph:
@@ -87,7 +86,7 @@ def export_onnx(weights: Weights, path: Path) -> None:
             graph.constants,
         ),
         opset_imports=[helper.make_opsetid("", OPSET)],
-        ir_version=8,
+        ir_version=IR_VERSION,
         producer_name="downstream-hpe",
     )
     facts = {

@@ -8,9 +8,12 @@ time that fill the memory. Nothing of that is needed here, so it is refused.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 
 MAX_BYTES = 64_000_000
+OPSET, IR_VERSION = 17, 8
+"""Versions of ONNX's operators and of its format in which models are exported."""
 
 _NAMES = """
     Abs Acos Add And Asin Atan Cast Clip Concat Constant Cos DequantizeLinear Div DynamicQuantizeLinear
@@ -23,8 +26,9 @@ OPERATIONS = frozenset(_NAMES.split())
 """Their outputs are about as large as their inputs."""
 
 # Field numbers of onnx.proto, by message.
-_GRAPH = 7  # ModelProto
+_IR_VERSION, _GRAPH, _OPSET = 1, 7, 8  # ModelProto
 _TRAINING, _FUNCTIONS = 20, 25
+_VERSION = 2  # OperatorSetIdProto
 _NODE, _INITIALIZER, _SPARSE_INITIALIZER = 1, 5, 15  # GraphProto
 _OPERATION, _ATTRIBUTE, _DOMAIN = 4, 5, 7  # NodeProto
 _TENSOR, _TENSORS = 5, 10  # AttributeProto
@@ -43,6 +47,20 @@ def fault(model: bytes) -> str | None:
     except ValueError:
         return "it is no ONNX file or cut off"
     return None
+
+
+def versions(model: bytes) -> tuple[int, int]:
+    """(operator set, IR version) in which a model says it is written; 0 for what it does not say."""
+    opset = ir_version = 0
+    # What is malformed is for fault to say.
+    with contextlib.suppress(ValueError):
+        for field, value in _fields(memoryview(model)):
+            if field == _IR_VERSION and isinstance(value, int):
+                ir_version = value
+            elif field == _OPSET and isinstance(value, memoryview):
+                numbers = (n for part, n in _fields(value) if part == _VERSION and isinstance(n, int))
+                opset = max(opset, *numbers, 0)
+    return opset, ir_version
 
 
 def _graph_fault(graph: memoryview) -> str | None:

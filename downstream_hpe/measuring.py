@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from downstream_hpe.errors import DataError
+from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.evaluation import BOUNDS_DEG, Estimator, constant_zero, rigid_fit, within_bounds
 from downstream_hpe.fitting import estimators
-from downstream_hpe.photographs import FORMATS, detected_rows
+from downstream_hpe.inputs import MEDIA
+from downstream_hpe.photographs import FORMATS, LeftOut, detected_rows
 from downstream_hpe.predictor import Predictor, model_folder
 from downstream_hpe.tables import Rows, read_missed, read_rows
 
@@ -22,14 +22,22 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Measured:
-    """rows: with a face. missed_deg: float64 [M, 3], (yaw, pitch, roll) of those without one."""
+    """rows: with a face. missed_deg: float64 [M, 3], (yaw, pitch, roll) of those without one. damaged: how
+    many more could not be read."""
 
     rows: Rows
     missed_deg: np.ndarray
+    damaged: int = 0
 
 
-def dataset_rows(predictor: Predictor, dataset: Path, split: str | None, note: Note) -> Measured:
-    """The rows of a dataset whose subjects the model was not trained on. DataError: no such rows."""
+def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, note: Note) -> Measured:
+    """The rows of a dataset whose subjects the model was not trained on.
+
+    Raises
+    ------
+    UsageError: pictures instead of tables. DataError: no such rows.
+    """
+    _expect_tables(Path(dataset))
     rows = read_rows(dataset, split)
     subjects, missed_deg = read_missed(dataset, split)
     trained = sorted(predictor.trained_subjects)
@@ -50,11 +58,16 @@ def photograph_rows(predictor: Predictor, path: Path, layout: str, note: Note) -
     ------
     DataError: as the format's loader; no face found.
     """
-    left_out: Counter[str] = Counter()
-    rows, missed_deg = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
-    for reason, count in left_out.items():
-        note(f"{count} photographs left out: {reason}")
-    return Measured(rows, missed_deg)
+    left_out = LeftOut()
+    try:
+        rows, missed_deg = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
+    finally:
+        # Also where nothing is left, for they say why.
+        for line in left_out.damaged:
+            note(f"{line}; left out")
+        for reason, count in left_out.filtered.items():
+            note(f"{count} photographs left out: {reason}")
+    return Measured(rows, missed_deg, len(left_out.damaged))
 
 
 def bounded(measured: Measured, path: Path, note: Note) -> Measured:
@@ -65,7 +78,8 @@ def bounded(measured: Measured, path: Path, note: Note) -> Measured:
         raise DataError(f"{path}: no pose within {bounds} degrees; use --all")
     if not inside.all():
         note(f"{int((~inside).sum())} rows outside {bounds} degrees left out")
-    return Measured(measured.rows.take(inside), measured.missed_deg[within_bounds(measured.missed_deg)])
+    missed_deg = measured.missed_deg[within_bounds(measured.missed_deg)]
+    return replace(measured, rows=measured.rows.take(inside), missed_deg=missed_deg)
 
 
 def model_estimators(model: str, predictor: Predictor, reference: np.ndarray | None) -> dict[str, Estimator]:
@@ -83,3 +97,14 @@ def model_estimators(model: str, predictor: Predictor, reference: np.ndarray | N
         every["rigid fit to reference face"] = rigid_fit(reference)
     every["encoder + heads"] = lambda landmarks: predictor.from_landmarks(landmarks).ypr_deg
     return every
+
+
+def _expect_tables(path: Path) -> None:
+    """UsageError where there are pictures and no tables. What else is wrong the reader of tables says."""
+    below = path.rglob("*") if path.is_dir() else [path]
+    suffixes = {file.suffix.lower() for file in below}
+    if suffixes & (MEDIA | {".mat", ".npz"}) and ".parquet" not in suffixes:
+        raise UsageError(
+            f"{path}: no dataset; evaluate takes a folder or .parquet of headturn build or, with --format "
+            "aflw2000, biwi or biwi-npz, labelled photographs; for others there is downstream-hpe predict"
+        )

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from zipfile import BadZipFile
@@ -36,42 +37,64 @@ class Photograph:
     centre: np.ndarray | None = None
 
 
-Loader = Callable[[Path, Counter[str]], Iterator[Photograph]]
-"""Called with the folder or file, and a count of what is left out, by its reason."""
+@dataclass
+class LeftOut:
+    """Labelled photographs that are not scored. filtered: how many the usual protocol drops, by its reason.
+    damaged: a line for each whose picture or label is missing or cannot be read."""
+
+    filtered: Counter[str] = field(default_factory=Counter)
+    damaged: list[str] = field(default_factory=list)
 
 
-def aflw2000(folder: Path, left_out: Counter[str]) -> Iterator[Photograph]:
+Loader = Callable[[Path, LeftOut], Iterator[Photograph]]
+"""Called with the folder or file, and where to say what is left out."""
+
+
+def aflw2000(folder: Path, left_out: LeftOut) -> Iterator[Photograph]:
     """AFLW2000-3D: image00002.jpg beside image00002.mat.
 
     Pose_Para is pitch, yaw, roll, ... in radians; the mean of pt3d_68 says which face is meant.
 
     Raises
     ------
-    DataError: no .mat file, one without Pose_Para, or without its picture.
+    DataError: no .mat file.
     """
+    for file in _labels(folder, "*", ".mat", ".jpg"):
+        try:
+            ypr_deg, centre = _aflw2000_label(file)
+            if np.abs(ypr_deg).max() > LARGEST_DEG:
+                left_out.filtered[f"an angle beyond {LARGEST_DEG:g} degrees"] += 1
+                continue
+            bgr = read_bgr(file.with_suffix(".jpg"))
+        except DataError as error:
+            left_out.damaged.append(str(error))
+            continue
+        yield Photograph(file.stem, file.stem, bgr, rotation_from_angles(ypr_deg), centre)
+
+
+def _aflw2000_label(file: Path) -> tuple[np.ndarray, np.ndarray | None]:
+    """(yaw, pitch, roll) in degrees, and the middle of the face in pixels, None where it does not say."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
-    for file in _some(folder.glob("*.mat"), folder, "*.mat"):
-        try:
-            label = loadmat(file, variable_names=["Pose_Para", "pt3d_68"])
-            pose = np.asarray(label["Pose_Para"], dtype=np.float64).ravel()
-            points = np.asarray(label.get("pt3d_68", np.empty((3, 0))), dtype=np.float64)
-        # scipy raises what it likes at a damaged file.
-        except (MatReadError, OSError, KeyError, ValueError, TypeError, NotImplementedError) as error:
-            raise DataError(f"{file}: no Pose_Para can be read from it") from error
-        if pose.size < 3 or not np.isfinite(pose[:3]).all():
-            raise DataError(f"{file}: Pose_Para is {pose.tolist()}, expected pitch, yaw, roll, ...")
-        pitch, yaw, roll = np.rad2deg(pose[:3])
-        if max(abs(yaw), abs(pitch), abs(roll)) > LARGEST_DEG:
-            left_out[f"an angle beyond {LARGEST_DEG:g} degrees"] += 1
-            continue
-        centre = points[:2].mean(axis=1) if points.shape == (3, 68) else None
-        rotation = rotation_from_angles(np.array([yaw, pitch, roll]))
-        yield Photograph(file.stem, file.stem, read_bgr(file.with_suffix(".jpg")), rotation, centre)
+    # scipy raises what it likes at a damaged file.
+    theirs = (MatReadError, OSError, LookupError, NameError, NotImplementedError, TypeError, ValueError)
+    try:
+        with file.open("rb") as stream:
+            label = loadmat(stream, variable_names=["Pose_Para", "pt3d_68"])
+        pose = np.asarray(label["Pose_Para"], dtype=np.float64).ravel()
+        points = np.asarray(label.get("pt3d_68", np.empty((3, 0))), dtype=np.float64)
+    except FileNotFoundError as error:
+        raise DataError(f"{file}: there is no such label beside {file.stem}.jpg") from error
+    except (*theirs, zlib.error) as error:
+        raise DataError(f"{file}: no Pose_Para can be read from it") from error
+    if pose.size < 3 or not np.isfinite(pose[:3]).all():
+        raise DataError(f"{file}: Pose_Para is {pose.tolist()}, expected pitch, yaw, roll, ...")
+    pitch, yaw, roll = np.rad2deg(pose[:3])
+    return np.array([yaw, pitch, roll]), points[:2].mean(axis=1) if points.shape == (3, 68) else None
 
 
-def biwi(folder: Path, left_out: Counter[str], colour_camera: bool = False) -> Iterator[Photograph]:
+def biwi(folder: Path, left_out: LeftOut, colour_camera: bool = False) -> Iterator[Photograph]:
     """BIWI Kinect as published: NN/frame_00003_rgb.png beside NN/frame_00003_pose.txt.
 
     A pose file holds R_C (HopeNet, FSA-Net and 6DRepNet transpose it first and then read M = R_C^T; the
@@ -83,32 +106,44 @@ def biwi(folder: Path, left_out: Counter[str], colour_camera: bool = False) -> I
 
     Raises
     ------
-    DataError: no pose file, one that holds no rotation, without its picture, or no rgb.cal where one is
-        needed.
+    DataError: no pose file, an rgb.cal that cannot be read, or none where one is needed.
     """
-    for file in _some(folder.rglob("frame_*_pose.txt"), folder, "frame_*_pose.txt"):
-        numbers = _numbers(file, 12, "a rotation and a place")
-        rotation, place = numbers[:9].reshape(3, 3), numbers[9:12]
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-2 or np.linalg.det(rotation) < 0:
-            raise DataError(f"{file}: its first three lines are not a rotation")
-        centre = None
-        calibration = file.with_name("rgb.cal")
-        if calibration.is_file():
-            # K, four distortions, then X_colour = R X_depth + t in mm.
-            values = _numbers(calibration, 25, "K, distortion, rotation and translation")
-            turn = values[13:22].reshape(3, 3)
-            seen = values[:9].reshape(3, 3) @ (turn @ place + values[22:25])
-            centre = seen[:2] / seen[2]
-            if colour_camera:
-                rotation = turn @ rotation
-        elif colour_camera:
-            raise DataError(f"{calibration}: there is no such file; use the format biwi, which needs none")
+    files = _labels(folder, "**/frame_*", "_pose.txt", "_rgb.png")
+    cameras = {place: _colour_camera(place, colour_camera) for place in sorted({f.parent for f in files})}
+    for file in files:
         picture = file.with_name(file.name.replace("_pose.txt", "_rgb.png"))
+        try:
+            numbers = _numbers(file, 12, "a rotation and a place")
+            rotation, place = numbers[:9].reshape(3, 3), numbers[9:12]
+            if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-2 or np.linalg.det(rotation) < 0:
+                raise DataError(f"{file}: its first three lines are not a rotation")
+            bgr = read_bgr(picture)
+        except DataError as error:
+            left_out.damaged.append(str(error))
+            continue
+        centre, camera = None, cameras[file.parent]
+        if camera is not None:
+            lens, turn, shift = camera
+            seen = lens @ (turn @ place + shift)
+            centre = seen[:2] / seen[2]
+            rotation = turn @ rotation if colour_camera else rotation
         subject = file.parent.name
-        yield Photograph(f"{subject}/{picture.stem}", subject, read_bgr(picture), rotation, centre)
+        yield Photograph(f"{subject}/{picture.stem}", subject, bgr, rotation, centre)
 
 
-def biwi_npz(file: Path, left_out: Counter[str]) -> Iterator[Photograph]:
+def _colour_camera(folder: Path, needed: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """K, R and t of NN/rgb.cal, X_colour = R X_depth + t in mm; None where there is no such file."""
+    file = folder / "rgb.cal"
+    if not file.is_file():
+        if needed:
+            raise DataError(f"{file}: there is no such file; use the format biwi, which needs none")
+        return None
+    # Four distortions stand between K and R.
+    values = _numbers(file, 25, "K, distortion, rotation and translation")
+    return values[:9].reshape(3, 3), values[13:22].reshape(3, 3), values[22:25]
+
+
+def biwi_npz(file: Path, left_out: LeftOut) -> Iterator[Photograph]:
     """BIWI as FSA-Net packs it: image uint8 [N, H, W, 3] (BGR) and pose [N, 3] (yaw, pitch, roll), degrees.
 
     Raises
@@ -149,7 +184,7 @@ def detected_rows(
 
     Raises
     ------
-    DataError: none found.
+    DataError: no photograph, or no face in any.
     """
     subjects, rotations, found = [], [], []
     missed = []
@@ -163,6 +198,8 @@ def detected_rows(
         subjects.append(photograph.subject)
         rotations.append(photograph.rotation)
         found.append(points[0].astype(np.float32))
+    if not found and not missed:
+        raise DataError("no photograph is left to look at")
     if not found:
         raise DataError(f"no face found in {len(missed)} photographs")
     names, rotation = np.array(subjects), np.stack(rotations)
@@ -183,6 +220,8 @@ def _numbers(file: Path, count: int, what: str) -> np.ndarray:
     """The first numbers of a text file."""
     try:
         numbers = np.array(file.read_text(encoding="ascii").split()[:count], dtype=np.float64)
+    except FileNotFoundError as error:
+        raise DataError(f"{file}: there is no such file") from error
     except (OSError, ValueError) as error:
         raise DataError(f"{file}: expected {count} numbers, {what}") from error
     if len(numbers) < count or not np.isfinite(numbers).all():
@@ -190,8 +229,15 @@ def _numbers(file: Path, count: int, what: str) -> np.ndarray:
     return numbers
 
 
-def _some(files: Iterator[Path], folder: Path, pattern: str) -> list[Path]:
-    found = sorted(files)
-    if not found:
-        raise DataError(f"{folder}: no {pattern} in it")
-    return found
+def _labels(folder: Path, pattern: str, label: str, picture: str) -> list[Path]:
+    """The label file of everything that has a label or a picture, in order. DataError: no label at all.
+
+    pattern: of their names, before the endings of a label and of a picture.
+    """
+    if not folder.is_dir():
+        raise DataError(f"{folder}: not a folder; expected one with *{label} beside *{picture}")
+    labels = set(folder.glob(pattern + label))
+    if not labels:
+        raise DataError(f"{folder}: no *{label} in it; expected one beside every *{picture}")
+    pictures = folder.glob(pattern + picture)
+    return sorted(labels | {file.with_name(file.name.removesuffix(picture) + label) for file in pictures})

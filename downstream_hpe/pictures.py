@@ -22,11 +22,17 @@ SMALLEST = 384
 """A drawn copy has at least so many pixels on its shorter side, for its text to be read."""
 
 
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom, pixels."""
+
+
 def read_bgr(path: Path) -> np.ndarray:
-    """uint8 [H, W, 3], BGR, upright. DataError where it is not a picture."""
+    """uint8 [H, W, 3], BGR, upright. DataError where there is no picture."""
     try:
         with Image.open(path) as image:
             rgb = ImageOps.exif_transpose(image).convert("RGB")
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: there is no such picture") from error
     # Pillow raises SyntaxError and ValueError, too, at damaged files.
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(f"{path}: not a readable picture") from error
@@ -37,16 +43,17 @@ def write_bgr(bgr: np.ndarray, path: Path) -> None:
     """uint8 [H, W, 3] to a file, by its suffix; its folder is made. DataError where that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        Image.fromarray(np.ascontiguousarray(bgr[..., ::-1])).save(path)
+        # The quality is that of a JPEG; lossy colours would fray the lines.
+        Image.fromarray(np.ascontiguousarray(bgr[..., ::-1])).save(path, quality=95)
     except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error.strerror})") from error
+        raise DataError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-def draw_faces(bgr: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
+def draw_faces(bgr: np.ndarray, faces: Sequence[Face], numbered: bool = False) -> np.ndarray:
     """A copy with the axes and angles of every face; the blue axis points where the nose does.
 
     Grey where the pose may not be believed: low confidence, or outside the trained range. Small
-    pictures are enlarged. bgr: uint8 [H, W, 3].
+    pictures are enlarged. bgr: uint8 [H, W, 3]. numbered: with the indices of the faces.
     """
     image = Image.fromarray(np.ascontiguousarray(bgr[..., ::-1]))
     scale = max(1, -(-SMALLEST // min(image.size)))
@@ -56,8 +63,10 @@ def draw_faces(bgr: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
         _axes(image, face, scale)
     # This mode blends what is drawn with alpha.
     draw = ImageDraw.Draw(image, "RGBA")
+    # Labels keep clear of each other and of the middle of faces, as far as there is room.
+    covered = [_middle(face, scale) for face in faces]
     for face in faces:
-        _label(draw, face, scale, image.size, len(faces) > 1)
+        covered.append(_label(draw, face, scale, image.size, numbered, covered))
     return np.asarray(image)[..., ::-1]
 
 
@@ -89,7 +98,25 @@ def _mixed(colour: tuple[int, int, int], faded: float) -> tuple[int, ...]:
     return tuple(round((1 - faded) * c + faded * g) for c, g in zip(colour, GREY, strict=True))
 
 
-def _label(draw: ImageDraw.ImageDraw, face: Face, scale: int, size: tuple[int, int], numbered: bool) -> None:
+def _middle(face: Face, scale: int) -> Box:
+    left, top, width, height = (side * scale for side in face.box)
+    return left + width / 8, top + height / 8, left + 7 * width / 8, top + 7 * height / 8
+
+
+def _overlap(a: Box, b: Box) -> float:
+    """Pixels that two boxes share."""
+    return max(0.0, min(a[2], b[2]) - max(a[0], b[0])) * max(0.0, min(a[3], b[3]) - max(a[1], b[1]))
+
+
+def _label(
+    draw: ImageDraw.ImageDraw,
+    face: Face,
+    scale: int,
+    size: tuple[int, int],
+    numbered: bool,
+    covered: Sequence[Box],
+) -> Box:
+    """Draw angles and confidence of a face, and say where."""
     left, top, width, height = (side * scale for side in face.box)
     lines = [
         "  ".join(
@@ -103,15 +130,19 @@ def _label(draw: ImageDraw.ImageDraw, face: Face, scale: int, size: tuple[int, i
     if not face.in_range:
         lines.append("outside the trained range")
     text = "\n".join(lines)
-    points = min(max(height / 12, min(size) / 34, 12), min(size) / 16)
+    points = min(max(height / 12, min(size) / (45 if numbered else 34), 12), min(size) / 16)
     font = ImageFont.load_default(size=points)
     pad = points / 3
     x0, y0, x1, y1 = draw.multiline_textbbox((0, 0), text, font=font)
     wide, high = x1 - x0 + 2 * pad, y1 - y0 + 2 * pad
-    # Above the face where there is room, else below; always inside the picture.
-    y = top - high - pad if top - high - pad >= 0 else top + height + pad
+    # Above the face where there is room, else below, else a little further off; always inside the picture.
     x = min(max(left + width / 2 - wide / 2, 0), max(size[0] - wide, 0))
-    y = min(max(y, 0), max(size[1] - high, 0))
-    draw.rectangle([x, y, x + wide, y + high], fill=(*EDGE, 185))
+    away = [step * (high + pad) for step in (0, 1, 2)]
+    tops = [y for step in away for y in (top - high - pad - step, top + height + pad + step)]
+    inside = [min(max(y, 0), max(size[1] - high, 0)) for y in tops]
+    boxes = [(x, y, x + wide, y + high) for y in inside]
+    box = min(boxes, key=lambda box: sum(_overlap(box, other) for other in covered))
+    draw.rectangle(box, fill=(*EDGE, 185))
     ink = (255, 255, 255) if face.sure else (255, 205, 90)
-    draw.multiline_text((x + pad - x0, y + pad - y0), text, font=font, fill=ink)
+    draw.multiline_text((x + pad - x0, box[1] + pad - y0), text, font=font, fill=ink)
+    return box

@@ -23,11 +23,10 @@ from downstream_hpe.video import VideoReader, VideoWriter
 
 @dataclass(frozen=True)
 class Options:
-    """faces: at most so many a picture or frame. drawn: folder for copies with the poses drawn.
-    smooth: one-euro filter on video, one a face. frames: of a video, at most so many."""
+    """faces: at most so many a picture or frame. smooth: one-euro filter on video, one a face. frames: of a
+    video, at most so many."""
 
     faces: int = 1
-    drawn: Path | None = None
     smooth: bool = False
     frames: int | None = None
 
@@ -59,8 +58,8 @@ def predictions(
 
 def _picture(source: Source, image: np.ndarray, predictor: Predictor, options: Options) -> Iterator[Record]:
     faces = _faces(image, predictor, options, FaceTracks(smooth=False), 0.0)
-    if options.drawn is not None:
-        write_bgr(draw_faces(image, faces), options.drawn / source.copy)
+    if source.copy is not None:
+        write_bgr(draw_faces(image, faces, options.faces > 1), source.copy)
     for face in faces or (None,):
         yield record(source.name, None, None, face)
 
@@ -73,8 +72,7 @@ def _video(
     leave_out: Callable[[str], None],
 ) -> Iterator[Record]:
     count = 0
-    target = None if options.drawn is None else options.drawn / source.copy
-    with reader, VideoWriter(target, reader.rate) as writer:
+    with reader, VideoWriter(source.copy, reader.rate) as writer:
         tracks = FaceTracks(options.smooth)
         began = time.monotonic()
         for image in islice(reader, options.frames):
@@ -82,12 +80,12 @@ def _video(
             live = isinstance(source.path, int)
             time_s = time.monotonic() - began if live else count / reader.rate
             faces = _faces(image, predictor, options, tracks, time_s)
-            if target is not None:
-                writer.add(draw_faces(image, faces))
+            if source.copy is not None:
+                writer.add(draw_faces(image, faces, options.faces > 1))
             for face in faces or (None,):
                 yield record(source.name, count, time_s, face)
             count += 1
-    if options.frames is None and reader.ended_early(count):
+    if reader.ended_early(count, options.frames):
         leave_out(f"{source.name}: ended after {count} of {reader.expected} frames; what there was is kept")
 
 

@@ -18,6 +18,7 @@ from downstream_hpe.normalise import POINTS
 MODEL_FILE = "model.onnx"
 FORMAT = "downstream-hpe 1"
 DEFAULT_MODEL = "headturn"
+EXPORT_AGAIN = "export it again with downstream-hpe export"
 MODELS = Path(__file__).parent / "models"
 """The models that come with the package, by name."""
 
@@ -77,13 +78,11 @@ class Predictor:
             ranges = np.array(facts["range_deg"], dtype=np.float64)
             subjects = frozenset(map(str, facts["trained_subjects"]))
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise ModelError(
-                f"{file}: no downstream-hpe metadata; export it with downstream-hpe export"
-            ) from error
+            raise ModelError(f"{file}: no downstream-hpe metadata; {EXPORT_AGAIN}") from error
         if facts.get("format") != FORMAT:
             raise ModelError(f"{file}: format {facts.get('format')!r}, expected {FORMAT!r}")
         if ranges.shape != (3, 2) or not (ranges[:, 0] < ranges[:, 1]).all():
-            raise ModelError(f"{file}: its trained range is no range of three angles; export it again")
+            raise ModelError(f"{file}: its trained range is no range of three angles; {EXPORT_AGAIN}")
         found = {v.name: (v.type, v.shape[1:]) for v in (*session.get_inputs(), *session.get_outputs())}
         for name, shape in SHAPES.items():
             optional = name == "confidence" and name not in found
@@ -114,13 +113,19 @@ class Predictor:
         if not len(points):
             none = {name: np.empty((0, *SHAPES[name]), dtype=np.float32) for name in self._outputs}
             return _pose(none)
-        found = dict(zip(self._outputs, self._session.run(self._outputs, {"landmarks": points}), strict=True))
+        try:
+            values = self._session.run(self._outputs, {"landmarks": points})
+        except _faults() as error:
+            raise ModelError(
+                f"{self._name}: fails on landmarks ({type(error).__name__}); {EXPORT_AGAIN}"
+            ) from error
+        found = dict(zip(self._outputs, values, strict=True))
         if not all(np.isfinite(value).all() for value in found.values()):
             if (np.ptp(points, axis=1) == 0).all(axis=1).any():
                 raise DataError(
                     "the landmarks of a face all coincide; leave out faces that were not detected"
                 )
-            raise ModelError(f"{self._name}: gives numbers that are not finite; export it again")
+            raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
         return _pose(found)
 
     def from_image(self, bgr: np.ndarray, faces: int = 1) -> Pose | None:
@@ -172,7 +177,6 @@ def _file_of(model: Path | str) -> Path:
 def _open(file: Path, content: bytes, threads: int) -> Any:
     try:
         import onnxruntime as ort
-        from onnxruntime.capi import onnxruntime_pybind11_state as faults
     except ImportError as error:
         raise ModelError("onnxruntime is not installed: pip install 'headturn[pose]'") from error
     reason = graph.fault(content)
@@ -181,14 +185,23 @@ def _open(file: Path, content: bytes, threads: int) -> Any:
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.log_severity_level = 4
-    # Its exceptions have no base of their own.
-    theirs = [e for e in vars(faults).values() if isinstance(e, type) and issubclass(e, Exception)]
-    broken: tuple[type[Exception], ...] = (*theirs, RuntimeError, MemoryError)
     try:
         return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except broken as error:
-        text = (str(error).splitlines() or ["out of memory"])[0]
-        raise ModelError(f"{file}: not a readable ONNX model ({text})") from error
+    except _faults() as error:
+        # Its own text is long and speaks of its source files; the cause keeps it.
+        reason = f"onnxruntime {ort.__version__} refuses it: {type(error).__name__}"
+        opset, ir_version = graph.versions(content)
+        if opset > graph.OPSET or ir_version > graph.IR_VERSION:
+            reason += f"; operator set {opset} or IR version {ir_version} may be too new for it"
+        raise ModelError(f"{file}: not a readable ONNX model ({reason}); {EXPORT_AGAIN}") from error
+
+
+def _faults() -> tuple[type[Exception], ...]:
+    """What onnxruntime raises; its exceptions have no base of their own."""
+    from onnxruntime.capi import onnxruntime_pybind11_state as faults
+
+    theirs = [e for e in vars(faults).values() if isinstance(e, type) and issubclass(e, Exception)]
+    return (*theirs, RuntimeError, MemoryError)
 
 
 def _pose(found: dict[str, np.ndarray]) -> Pose:

@@ -50,12 +50,12 @@ def record(name: str, frame: int | None, time_s: float | None, face: Face | None
     return row
 
 
-def text(row: Record) -> str:
-    """A row as people read it."""
+def text(row: Record, numbered: bool = False) -> str:
+    """A row as people read it. numbered: with the index of the face, as there may be several."""
     where = row["input"] + (f" {row['time_s']:.2f} s" if row["frame"] is not None else "")
     if not row["found"]:
         return f"{where}: no face found"
-    parts = [f"face {row['face']}"] if row["face"] else []
+    parts = [f"face {row['face']}"] if numbered else []
     parts += [f"{name} {row[f'{name}_deg']:.1f}" for name in ("yaw", "pitch", "roll")]
     if row["confidence"] is not None:
         parts.append(f"confidence {row['confidence']:.2f}")

@@ -176,12 +176,20 @@ def subjects_by_split(path: Path | str) -> dict[str, set[str]]:
 def file_batches(
     file: ds.ParquetFileFragment, columns: Sequence[str], where: ds.Expression | None
 ) -> Iterator[pa.RecordBatch]:
-    """Rows of one file that pass where; only the row groups and columns needed are read."""
+    """Rows of one file that pass where; only the row groups and columns needed are read.
+
+    Raises
+    ------
+    DataError: the file is damaged.
+    """
     # Without read-ahead one batch is in memory, not sixteen.
     scanner = file.scanner(
         columns=list(columns), filter=where, batch_size=BATCH_ROWS, batch_readahead=0, use_threads=False
     )
-    return (batch for batch in scanner.to_batches() if len(batch))
+    try:
+        yield from (batch for batch in scanner.to_batches() if len(batch))
+    except (pa.ArrowException, OSError) as error:
+        raise DataError(f"{file.path}: damaged; headturn verify says more of it") from error
 
 
 def column(batch: pa.RecordBatch, name: str) -> np.ndarray:
@@ -236,6 +244,8 @@ def cell_name(head: str, ypr_deg: Sequence[float]) -> str:
 def _parquet_files(where: Path) -> list[Path]:
     if where.is_file():
         return [where]
+    if not where.exists():
+        raise DataError(f"{where}: not there; expected a dataset made by headturn build")
     folder = where / "data" if (where / "data").is_dir() else where
     files = sorted(folder.rglob("*.parquet"))
     if not files:
@@ -248,7 +258,7 @@ def _open(path: Path) -> ds.ParquetFileFragment:
     try:
         fragment.ensure_complete_metadata()
     except (pa.ArrowInvalid, OSError) as error:
-        raise DataError(f"{path}: not a readable Parquet file ({str(error).splitlines()[0]})") from error
+        raise DataError(f"{path}: not a readable Parquet file; expected one of headturn build") from error
     return fragment
 
 

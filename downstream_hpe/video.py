@@ -13,7 +13,7 @@ import numpy as np
 
 from downstream_hpe.errors import INSTALL, DataError, ModelError
 
-SUFFIXES = {".mp4", ".mov", ".avi", ".mkv", ".webm"}
+SUFFIXES = {".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv"}
 FALLBACK_RATE = 30.0
 """Frames a second, where a camera or file does not say."""
 
@@ -39,9 +39,12 @@ class VideoReader:
         self.rate = rate if np.isfinite(rate) and rate > 0 else FALLBACK_RATE
         self.expected = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
 
-    def ended_early(self, count: int) -> bool:
-        """Whether the file promised more than count frames, beyond the error of such promises."""
-        return count < 0.95 * self.expected - 1
+    def ended_early(self, count: int, limit: int | None = None) -> bool:
+        """Whether the file promised more than count frames, beyond the error of such promises.
+
+        limit: so many were asked for; None: all.
+        """
+        return count < (limit or self.expected) and count < 0.95 * self.expected - 1
 
     def __iter__(self) -> Iterator[np.ndarray]:
         """uint8 [H, W, 3], BGR. Ends with the last whole frame, also of a file that was cut off."""
@@ -76,12 +79,15 @@ class VideoWriter:
             if self._path is None:
                 raise ValueError("a frame, but no file to write it to")
             cv2 = _opencv()
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise DataError(f"{self._path}: cannot be written ({error.strerror})") from error
             height, width = bgr.shape[:2]
             code = cv2.VideoWriter.fourcc(*"mp4v")
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate, (width, height))
             if not self._writer.isOpened():
-                raise DataError(f"{self._path}: cannot be written as video; expected an .mp4 file")
+                raise DataError(f"{self._path}: cannot be written as video")
         self._writer.write(np.ascontiguousarray(bgr))
 
     def __enter__(self) -> VideoWriter:

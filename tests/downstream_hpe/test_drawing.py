@@ -55,6 +55,17 @@ def test_small_pictures_are_enlarged(shape, expected):
     assert drawn.max() > 200
 
 
+def test_labels_of_neighbours_keep_clear_of_each_other():
+    picture = np.zeros((600, 900, 3), dtype=np.uint8)
+    faces = [face(), face(ypr=(-30.0, 10, 5), index=1)]
+    faces[0].landmarks[:, :2] += 200
+    faces[1].landmarks[:, :2] += [320, 190]
+    apart = [(draw_faces(picture, [one], numbered=True) == 255).all(-1).sum() for one in faces]
+    # White is the letters' alone; were one label on the other, some would be lost.
+    together = (draw_faces(picture, faces, numbered=True) == 255).all(-1).sum()
+    assert together == sum(apart)
+
+
 def test_tables_of_both_kinds_hold_the_same(tmp_path):
     rows = [record("a.png", None, None, face()), record("v.mp4", 3, 0.12, face(confidence=None, index=1))]
     rows.append(record("v.mp4", 4, 0.16, None))
@@ -69,7 +80,9 @@ def test_tables_of_both_kinds_hold_the_same(tmp_path):
     assert [r["face"] for r in read] == ["0", "1", ""]
     assert float(read[0]["yaw_deg"]) == rows[0]["yaw_deg"] == 30.0
     assert text(rows[0]) == "a.png: yaw 30.0, pitch 10.0, roll 5.0, confidence 0.90"
-    assert text(rows[1]) == "v.mp4 0.12 s: face 1, yaw 30.0, pitch 10.0, roll 5.0"
+    # Where there may be several faces, each has its index, the first one, too.
+    assert text(rows[0], numbered=True).startswith("a.png: face 0, yaw 30.0")
+    assert text(rows[1], numbered=True) == "v.mp4 0.12 s: face 1, yaw 30.0, pitch 10.0, roll 5.0"
     assert text(rows[2]) == "v.mp4 0.16 s: no face found"
 
 

@@ -12,14 +12,13 @@ from downstream_hpe.evaluation import (
     constant_zero,
     evaluate,
     markdown,
-    plot_distribution,
-    plot_intervals,
     rigid_fit,
     split_subjects,
     within_bounds,
     write_csv,
 )
 from downstream_hpe.normalise import normalise
+from downstream_hpe.plots import interval_figure, write_plots
 from downstream_hpe.reference import load_reference, mean_face
 from downstream_hpe.rotation import rotation_from_angles
 from downstream_hpe.tables import Rows
@@ -109,10 +108,29 @@ def test_tables_and_plots(tmp_path, rows):
         lines = list(csv.DictReader(file))
     assert len(lines) == 2 * (1 + 3 + 18)
     assert lines[0]["angle"] == "all"
-    plot_intervals(results, tmp_path / "i.png")
-    plot_distribution(results, tmp_path / "d.png")
-    for name in ("i.png", "d.png"):
+    write_plots(results, tmp_path)
+    for name in ("error_by_interval.png", "error_distribution.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_interval_without_rows_is_no_bar(rows):
+    level = rows.take(rows.ypr_deg[:, 2] == 0)
+    results = [
+        evaluate("zero", constant_zero(level.landmarks), level.rotation),
+        evaluate("pitch off by 3", level.ypr_deg + np.array([0, 3, 0]), level.rotation),
+        evaluate("roll off by 2", level.ypr_deg + np.array([0, 0, 2]), level.rotation),
+    ]
+    yaw, pitch, roll = interval_figure(results).axes
+    for panel, expected in ((yaw, [15, 15, 0, 15, 15, 15]), (roll, [0, 0, 0, 75, 0, 0])):
+        assert [label.get_text() for label in panel.get_xticklabels(minor=True)] == list(map(str, expected))
+        hatched = sorted(patch.get_x() + 0.5 for patch in panel.patches if patch.get_hatch())
+        assert hatched == [k for k, count in enumerate(expected) if not count]
+        for bars in panel.containers:
+            assert [np.isfinite(bar.get_height()) for bar in bars] == [count > 0 for count in expected]
+    # The constant answer is cut off and says its value; an estimate without error says so, too.
+    assert pitch.get_ylim()[1] < 4
+    assert [text.get_text() for text in pitch.texts if text.get_position()[0] < -0.2] == ["40"]
+    assert [text.get_text() for text in roll.texts] == ["0", "0"]
 
 
 def test_what_cannot_be_evaluated_is_refused(rows):

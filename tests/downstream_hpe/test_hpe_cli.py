@@ -113,7 +113,7 @@ def test_export_writes_what_predictor_reads(model, dataset, tmp_path, monkeypatc
 
 
 MISTAKES = {
-    "no dataset": (["fit", "nowhere", "--out", "m"], 1, "nowhere: no .parquet file"),
+    "no dataset": (["fit", "nowhere", "--out", "m"], 1, "nowhere: not there; expected a dataset"),
     "three ranks": (
         ["fit", "nowhere", "--out", "m", "--ranks", "5,3,3"],
         2,

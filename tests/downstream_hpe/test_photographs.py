@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from PIL import Image
 from scipy.io import savemat
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.photographs import FORMATS, aflw2000, biwi, biwi_npz, detected_rows
+from downstream_hpe.photographs import FORMATS, LeftOut, aflw2000, biwi, biwi_npz, detected_rows
 from downstream_hpe.rotation import angles_from_rotation, rotation_from_angles
 
 YPR = np.array([-35, 12.5, -7])
@@ -63,19 +61,20 @@ def test_aflw2000_order_units_and_filter(tmp_path):
     aflw(tmp_path, "image00002", YPR, pt3d_68=points)
     aflw(tmp_path, "image00004", [99.5, 0, 0])
     aflw(tmp_path, "image00005", [0, -99.0, 98.9])
-    left_out = Counter()
+    left_out = LeftOut()
     first, second = aflw2000(tmp_path, left_out)
     np.testing.assert_allclose(angles_from_rotation(first.rotation), YPR, atol=1e-9)
     np.testing.assert_allclose(first.centre, points[:2].mean(axis=1))
     assert second.centre is None
     assert first.bgr.shape == (6, 8, 3)
     assert first.bgr[0, 0, 2] > 250 > first.bgr[0, 0, 0]
-    assert left_out == {"an angle beyond 99 degrees": 1}
+    assert left_out.damaged == []
+    assert left_out.filtered == {"an angle beyond 99 degrees": 1}
 
 
 def test_biwi_angles_are_those_of_its_usual_readers(tmp_path):
     kinect(tmp_path / "hpdb")
-    (only,) = biwi(tmp_path, Counter())
+    (only,) = biwi(tmp_path, LeftOut())
     # HopeNet, FSA-Net, 6DRepNet: the file's matrix, transposed first.
     m = np.array(POSE.split()[:9], dtype=float).reshape(3, 3).T
     roll, pitch = -np.arctan2(m[1, 0], m[0, 0]), np.arctan2(m[2, 1], m[2, 2])
@@ -89,14 +88,14 @@ def test_biwi_angles_are_those_of_its_usual_readers(tmp_path):
 
 def test_biwi_in_the_frame_of_the_colour_camera(tmp_path):
     kinect(tmp_path)
-    (label,), (seen,) = biwi(tmp_path, Counter()), FORMATS["biwi-colour"](tmp_path, Counter())
+    (label,), (seen,) = biwi(tmp_path, LeftOut()), FORMATS["biwi-colour"](tmp_path, LeftOut())
     turn = np.array(RGB_CAL.split()[13:22], dtype=float).reshape(3, 3)
     np.testing.assert_allclose(seen.rotation, turn @ label.rotation)
     (tmp_path / "01" / "rgb.cal").unlink()
-    (plain,) = biwi(tmp_path, Counter())
+    (plain,) = biwi(tmp_path, LeftOut())
     assert plain.centre is None
     with pytest.raises(DataError, match=r"rgb\.cal: there is no such file"):
-        list(FORMATS["biwi-colour"](tmp_path, Counter()))
+        list(FORMATS["biwi-colour"](tmp_path, LeftOut()))
 
 
 def test_the_generators_biwi_export_is_read_back(tmp_path):
@@ -104,20 +103,20 @@ def test_the_generators_biwi_export_is_read_back(tmp_path):
     lines = "\n".join(" ".join(f"{x:.12f}" for x in row) for row in rotation)
     identity = "700 0 128\n0 700 128\n0 0 1\n\n0 0 0 0\n\n1 0 0\n0 1 0\n0 0 1\n\n0 0 0\n\n256 256\n"
     kinect(tmp_path, f"{lines}\n\n0 0 700\n", identity)
-    (only,) = biwi(tmp_path, Counter())
+    (only,) = biwi(tmp_path, LeftOut())
     np.testing.assert_allclose(only.rotation, rotation, atol=1e-9)
     np.testing.assert_allclose(only.centre, [128, 128])
 
 
 def test_biwi_as_npz(tmp_path):
     np.savez(tmp_path / "b.npz", image=np.zeros((2, 4, 4, 3), np.uint8), pose=np.stack([YPR, -YPR]))
-    first, second = biwi_npz(tmp_path / "b.npz", Counter())
+    first, second = biwi_npz(tmp_path / "b.npz", LeftOut())
     np.testing.assert_allclose(angles_from_rotation(first.rotation), YPR)
     np.testing.assert_allclose(angles_from_rotation(second.rotation), -YPR)
     radians = np.deg2rad(np.tile(YPR, (200, 1)))
     np.savez(tmp_path / "r.npz", image=np.zeros((200, 4, 4, 3), np.uint8), pose=radians)
     with pytest.raises(DataError, match="these look like radians"):
-        list(biwi_npz(tmp_path / "r.npz", Counter()))
+        list(biwi_npz(tmp_path / "r.npz", LeftOut()))
 
 
 def test_the_labelled_face_among_several_and_misses(tmp_path):
@@ -131,40 +130,87 @@ def test_the_labelled_face_among_several_and_misses(tmp_path):
         asked.append(limit)
         return two[:limit]
 
-    rows, missed_deg = detected_rows(aflw2000(tmp_path, Counter()), faces)
+    rows, missed_deg = detected_rows(aflw2000(tmp_path, LeftOut()), faces)
     assert min(asked) > 1
     assert (len(rows), rows.undetected) == (2, 1)
     np.testing.assert_allclose(rows.landmarks[:, :, 0].mean(axis=1), two[::-1, :, 0].mean(axis=1), atol=1e-4)
     np.testing.assert_allclose(missed_deg, [YPR + 2])
     with pytest.raises(DataError, match="no face found in 3 photographs"):
-        detected_rows(aflw2000(tmp_path, Counter()), lambda bgr, limit: two[:0])
+        detected_rows(aflw2000(tmp_path, LeftOut()), lambda bgr, limit: two[:0])
 
 
 def test_without_a_labelled_place_the_most_prominent_face_is_taken(tmp_path):
     images = np.stack([np.zeros((4, 4, 3)), np.ones((4, 4, 3))]).astype(np.uint8)
     np.savez(tmp_path / "b.npz", image=images, pose=np.stack([YPR, -YPR]))
-    photographs = biwi_npz(tmp_path / "b.npz", Counter())
+    photographs = biwi_npz(tmp_path / "b.npz", LeftOut())
     rows, missed_deg = detected_rows(photographs, lambda bgr, limit: FACE[None][: limit if bgr.any() else 0])
     np.testing.assert_allclose(rows.ypr_deg, [-YPR])
     np.testing.assert_allclose(missed_deg, [YPR])
 
 
 def test_damaged_and_foreign_files_say_so(tmp_path):
-    left_out = Counter()
-    with pytest.raises(DataError, match=r"no \*\.mat in it"):
-        list(aflw2000(tmp_path, left_out))
-    (tmp_path / "a.mat").write_bytes(b"no")
-    with pytest.raises(DataError, match="no Pose_Para"):
-        list(aflw2000(tmp_path, left_out))
-    kinect(tmp_path, "1 2 3\n4 5 6\n7 8 9\n\n0 0 700\n")
-    with pytest.raises(DataError, match="not a rotation"):
-        list(biwi(tmp_path, left_out))
-    kinect(tmp_path, "1 2 3\n4 5 6\n")
-    with pytest.raises(DataError, match="expected 12 numbers"):
-        list(biwi(tmp_path, left_out))
+    left_out = LeftOut()
+    for load in (aflw2000, biwi):
+        with pytest.raises(DataError, match=r"no \*.* in it; expected one beside every \*"):
+            list(load(tmp_path, left_out))
+        with pytest.raises(DataError, match="not a folder"):
+            list(load(tmp_path / "nowhere", left_out))
     np.savez(tmp_path / "x.npz", image=np.array([{"pickled": 1}], dtype=object), pose=np.zeros((1, 3)))
     whole = (tmp_path / "x.npz").read_bytes()
     for content in (whole, whole[:100], b"no", b""):
         (tmp_path / "x.npz").write_bytes(content)
         with pytest.raises(DataError, match=r"expected an \.npz"):
             list(biwi_npz(tmp_path / "x.npz", left_out))
+
+
+def test_what_is_damaged_is_left_out_with_a_line_each(tmp_path):
+    aflw(tmp_path, "a", YPR)
+    whole = (tmp_path / "a.mat").read_bytes()
+    packed = tmp_path / "packed.mat"
+    savemat(packed, {"Pose_Para": np.zeros((1, 7)), "pt3d_68": FACE[:68].T}, do_compression=True)
+    spoiled = bytearray(packed.read_bytes())
+    spoiled[150] ^= 255
+    packed.unlink()
+    labels = {"b": b"no", "c": b"", "d": whole[:100], "e": whole[:200], "f": bytes(spoiled)}
+    for name, content in labels.items():
+        (tmp_path / f"{name}.mat").write_bytes(content)
+    savemat(tmp_path / "g.mat", {"other": 1})
+    savemat(tmp_path / "h.mat", {"Pose_Para": np.full((1, 7), np.nan)})
+    picture(tmp_path / "i.jpg")
+    aflw(tmp_path, "j", YPR)
+    (tmp_path / "j.jpg").write_bytes(b"no")
+    aflw(tmp_path, "k", YPR)
+    (tmp_path / "k.jpg").unlink()
+    aflw(tmp_path, "l", -YPR)
+    left_out = LeftOut()
+    assert [p.name for p in aflw2000(tmp_path, left_out)] == ["a", "l"]
+    says = [line.removeprefix(f"{tmp_path}/") for line in left_out.damaged]
+    assert says == [
+        *(f"{name}.mat: no Pose_Para can be read from it" for name in "bcdefg"),
+        "h.mat: Pose_Para is [nan, nan, nan, nan, nan, nan, nan], expected pitch, yaw, roll, ...",
+        "i.mat: there is no such label beside i.jpg",
+        "j.jpg: not a readable picture",
+        "k.jpg: there is no such picture",
+    ]
+
+
+def test_damaged_frames_of_biwi_are_left_out_with_a_line_each(tmp_path):
+    kinect(tmp_path)
+    frames = tmp_path / "01"
+    for n, pose in ((4, "1 2 3\n4 5 6\n7 8 9\n\n0 0 700\n"), (5, "1 2 3\n"), (6, None), (7, POSE)):
+        picture(frames / f"frame_0000{n}_rgb.png")
+        if pose is not None:
+            (frames / f"frame_0000{n}_pose.txt").write_text(pose)
+    (frames / "frame_00007_rgb.png").write_bytes(b"no")
+    left_out = LeftOut()
+    assert [p.name for p in biwi(tmp_path, left_out)] == ["01/frame_00003_rgb"]
+    assert [line.removeprefix(f"{frames}/") for line in left_out.damaged] == [
+        "frame_00004_pose.txt: its first three lines are not a rotation",
+        "frame_00005_pose.txt: expected 12 numbers, a rotation and a place",
+        "frame_00006_pose.txt: there is no such file",
+        "frame_00007_rgb.png: not a readable picture",
+    ]
+    # A calibration that cannot be read would spoil them all.
+    (frames / "rgb.cal").write_text("517 0")
+    with pytest.raises(DataError, match=r"rgb\.cal: expected 25 numbers"):
+        list(biwi(tmp_path, left_out))

@@ -64,8 +64,9 @@ def test_folder_with_everything(shipped, photograph, tmp_path, monkeypatch, capf
     assert errors.splitlines()[0].endswith("1 files that are no picture or video skipped (notes.txt)")
     # And the detector's own start-up notes are not among them.
     assert "a face in 2 of 3 pictures and frames" in errors.splitlines()[1]
-    assert len(errors.splitlines()) == 2
+    assert errors.splitlines()[2:] == [f"drawn: {drawn}"]
     assert "black.png: no face found" in output
+    assert "both.jpg: face 0, yaw" in output and "both.jpg: face 1, yaw" in output
     rows = pq.read_table(table).to_pylist()
     assert [(r["input"].split("/")[-1], r["face"]) for r in rows] == [
         ("black.png", None), ("both.jpg", 0), ("both.jpg", 1), ("astronaut.png", 0),
@@ -105,6 +106,7 @@ def test_labelled_photographs(shipped, photograph, tmp_path, monkeypatch, capsys
     assert run(*arguments, "--json", monkeypatch=monkeypatch) == 0
     output, errors = capsys.readouterr()
     found = json.loads(output)
+    assert [e["damaged"] for e in found] == [0, 0]
     assert [(e["estimator"], e["rows"], e["undetected"]) for e in found] == [
         ("constant zero", 1, 1), ("encoder + heads", 1, 1),
     ]  # fmt: skip
@@ -112,6 +114,22 @@ def test_labelled_photographs(shipped, photograph, tmp_path, monkeypatch, capsys
     assert "1 photographs left out: an angle beyond 99 degrees" in errors
     assert run(*arguments, monkeypatch=monkeypatch) == 0
     assert "| pitch | 13.33 to 26.67 | 1 | 1 (100%) |" in capsys.readouterr().out
+    # What is damaged is left out, a line each, and the rest is scored.
+    (tmp_path / "a-copy.mat").write_bytes((tmp_path / "a.mat").read_bytes())
+    photograph.save(tmp_path / "d.jpg")
+    assert run(*arguments, "--json", monkeypatch=monkeypatch) == 3
+    output, errors = capsys.readouterr()
+    assert [(e["rows"], e["damaged"]) for e in json.loads(output)] == [(1, 2)] * 2
+    assert errors.splitlines()[:2] == [
+        f"{tmp_path}/a-copy.jpg: there is no such picture; left out",
+        f"{tmp_path}/d.mat: there is no such label beside d.jpg; left out",
+    ]
+    (tmp_path / "a.mat").unlink()
+    (tmp_path / "b.mat").unlink()
+    assert run(*arguments, monkeypatch=monkeypatch) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len([line for line in lines if line.endswith("; left out")]) == 4
+    assert lines[-1] == "downstream-hpe: no photograph is left to look at"
 
 
 def test_ctrl_c_keeps_what_was_written(shipped, tmp_path, monkeypatch, capsys):
@@ -142,11 +160,14 @@ MISTAKES = {
     "no video in the file": (["predict", "text.mp4"], 1, "text.mp4: cannot be opened as video"),
     "no webcam": (["predict", "webcam:63"], 1, "webcam:63: there is no such webcam"),
     "no table": (["predict", "a.png", "--out", "t.xls"], 2, "t.xls: expected a .csv or .parquet file"),
-    "no room for the copies": (["predict", "a.png", "--draw", "text.png"], 1, "cannot be written"),
-    "no folder for the report": (["evaluate", "headturn", "d", "--out", "text.png"], 1, "text.png'"),
+    "no number of a webcam": (["predict", "webcam:-1"], 2, "webcam:-1: expected a number"),
+    "no room for the copies": (["predict", "a.png", "--draw", "a.png/d"], 1, "cannot be written"),
+    "no folder for the report": (["evaluate", "headturn", "d", "--out", "text.png"], 2, "takes a folder"),
     "overwriting": (["predict", "a.png", "--draw", "."], 2, "a.png: --draw would overwrite it"),
-    "no dataset": (["evaluate", "headturn", "nowhere"], 1, "no .parquet file"),
-    "no photographs": (["evaluate", "headturn", ".", "--format", "biwi"], 1, "no frame_*_pose.txt in it"),
+    "no dataset": (["evaluate", "headturn", "nowhere"], 1, "nowhere: not there; expected a dataset"),
+    "a photograph": (["evaluate", "headturn", "a.png"], 2, "for others there is downstream-hpe predict"),
+    "photographs": (["evaluate", "headturn", "p"], 2, "--format aflw2000, biwi or biwi-npz"),
+    "no photographs": (["evaluate", "headturn", ".", "--format", "biwi"], 1, "no *_pose.txt in it"),
 }
 
 
@@ -158,6 +179,8 @@ def test_mistakes_are_one_clear_line(shipped, arguments, code, says, tmp_path, m
     Image.new("RGB", (32, 32)).save("a.png")
     for name in ("text.png", "text.mp4"):
         (tmp_path / name).write_text("text")
+    (tmp_path / "p" / "deep").mkdir(parents=True)
+    Image.new("RGB", (8, 8)).save(tmp_path / "p" / "deep" / "b.JPG")
     ideal.write(tmp_path / "d" / "part.parquet", ideal.rows(np.zeros((468, 3)), "nobody"))
     assert run(*arguments, monkeypatch=monkeypatch) == code
     error = capfd.readouterr().err

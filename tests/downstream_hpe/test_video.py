@@ -79,8 +79,8 @@ def test_every_frame_has_a_record_and_faces_keep_their_index(tmp_path):
     # One stays, one comes from the right and passes below where the detector names it first.
     frames = [frame(n * 2, 50 - n) if n != 5 else frame() for n in range(12)]
     clip = write(tmp_path / "clip.mp4", frames)
-    options = Options(faces=2, drawn=tmp_path / "drawn", smooth=True)
-    every = find_sources([str(clip)])
+    options = Options(faces=2, smooth=True)
+    every = find_sources([str(clip)], tmp_path / "drawn")
     records = list(predictions(every, Spots(), options))
     assert [r["frame"] for r in records if not r["found"]] == [5]
     assert [r["frame"] for r in records] == [f for f in range(12) for _ in range(1 if f == 5 else 2)]
@@ -120,6 +120,11 @@ def test_a_video_cut_off_keeps_what_was_read(tmp_path):
     writer.release()
     whole = (tmp_path / "w.avi").read_bytes()
     (tmp_path / "cut.avi").write_bytes(whole[: len(whole) // 2])
+    (every,) = find_sources([str(tmp_path / "cut.avi")])
+    for limit, expected in ((10, 0), (100, 1)):
+        notes = []
+        list(predictions([every], Spots(), Options(frames=limit), notes.append))
+        assert len(notes) == expected
     (tmp_path / "none.mp4").write_bytes(b"no video")
     (tmp_path / "head.mp4").write_bytes(write(tmp_path / "v.mp4", [frame(3)] * 9).read_bytes()[:200])
     notes = []
@@ -138,7 +143,7 @@ def test_no_webcam_is_one_line():
     if Path("/dev/video63").exists():
         pytest.skip("there is a webcam 63")
     notes = []
-    assert not list(predictions([Source(63, Path("w.mp4"))], Spots(), Options(), notes.append))
+    assert not list(predictions([Source(63)], Spots(), Options(), notes.append))
     assert notes == ["webcam:63: there is no such webcam, or another program uses it"]
 
 
@@ -152,7 +157,7 @@ def test_folders_with_other_files_and_the_same_names(tmp_path):
     for _ in range(2):  # the second time, drawn copies lie below the input
         notes = []
         every = find_sources([str(tmp_path)], drawn, notes.append)
-        records = list(predictions(every, Spots(), Options(drawn=drawn), notes.append))
+        records = list(predictions(every, Spots(), Options(), notes.append))
         assert [Path(r["input"]).name for r in records] == ["a.jpg", "a.png", "a.jpg", "x.PNG"]
         copies = sorted(str(f.relative_to(drawn)) for f in drawn.rglob("*.*"))
         assert copies == ["a-2.png", "a.png", "b/a.png", "b/c/x.png"]
@@ -175,6 +180,37 @@ def test_inputs_that_are_none(tmp_path):
 def test_a_copy_that_cannot_be_written(tmp_path):
     (tmp_path / "drawn").write_text("a file")
     Image.fromarray(frame(3)).save(tmp_path / "a.png")
-    every = find_sources([str(tmp_path / "a.png")])
+    with pytest.raises(UsageError, match="--draw takes a folder"):
+        find_sources([str(tmp_path / "a.png")], tmp_path / "drawn")
+    every = find_sources([str(tmp_path / "a.png")], tmp_path / "drawn" / "deeper")
     with pytest.raises(DataError, match=r"drawn.*cannot be written"):
-        list(predictions(every, Spots(), Options(drawn=tmp_path / "drawn")))
+        list(predictions(every, Spots(), Options()))
+
+
+def test_one_input_is_drawn_into_the_file_that_is_named(tmp_path):
+    picture, clip = tmp_path / "a.jpg", write(tmp_path / "clip.mp4", [frame(3)] * 3)
+    Image.fromarray(frame(3)).save(picture)
+    for given, drawn in ((picture, "new/x.jpg"), (clip, "new/x.mp4")):
+        list(predictions(find_sources([str(given)], tmp_path / drawn), Spots(), Options()))
+        assert (tmp_path / drawn).is_file()
+    for given, drawn, says in (
+        ([picture], "x.mp4", "takes a folder or a file .bmp .jpeg .jpg .png"),
+        ([clip], "x.png", "takes a folder or a file .mp4"),
+        ([clip], "x.avi", "takes a folder or a file .mp4"),
+        ([picture, clip], "x.png", "one file for 2 pictures and videos"),
+        ([picture], "a.jpg", r"a\.jpg: --draw would overwrite it"),
+    ):
+        with pytest.raises(UsageError, match=says):
+            find_sources([str(path) for path in given], tmp_path / drawn)
+    (tmp_path / "folder.png").mkdir()
+    (only,) = find_sources([str(picture)], tmp_path / "folder.png")
+    assert only.copy == tmp_path / "folder.png" / "a.png"
+
+
+def test_a_copy_never_replaces_another_input(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.jpg", "a.png"):
+        Image.fromarray(frame(3)).save(name)
+    # The copy of a.jpg would be a.png.
+    with pytest.raises(UsageError, match=r"a\.png: --draw would overwrite it"):
+        find_sources(["a.jpg", str(tmp_path / "a.png")], Path())
