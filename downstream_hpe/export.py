@@ -93,6 +93,7 @@ def export_onnx(weights: Weights, path: Path) -> None:
         "normalisation": normalisation,
         "range_deg": weights.range_deg.tolist(),
         "trained_subjects": list(weights.trained_subjects),
+        "pose_zero": weights.pose_zero,
     }
     helper.set_model_props(model, packed(FORMAT, facts))
     onnx.checker.check_model(model, full_check=True)

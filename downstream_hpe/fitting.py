@@ -31,6 +31,7 @@ from downstream_hpe.evaluation import (
 from downstream_hpe.manifold import MIN_SAMPLES, plot_manifolds
 from downstream_hpe.model import Progress, TensorModel
 from downstream_hpe.normalise import Normalisation, normalise
+from downstream_hpe.pose_zero import common_zero
 from downstream_hpe.predictor import MODEL_FILE, Predictor
 from downstream_hpe.reference import mean_face
 from downstream_hpe.rotation import rotation_from_angles
@@ -100,6 +101,7 @@ def fit(
     if settings.extra and not recipe.continuous:
         raise UsageError("the paper's recipe learns from a grid alone; leave out --extra or its recipe")
     every = [dataset, *map(Path, settings.extra)]
+    zero = common_zero(every)
     trained, held_out = _subjects(every, settings)
     rows = Rows.joined([read_rows(path) for path in every])
     mine, theirs = (rows.take(np.isin(rows.subjects, sorted(some))) for some in (trained, held_out))
@@ -109,7 +111,7 @@ def fit(
     torch.set_num_threads(settings.threads)
     network = train(mine, model, recipe, folder, progress)
     ranges = model.manifolds.range_deg
-    weights = Weights(network, settings.normalisation, ranges, None, tuple(sorted(trained)))
+    weights = Weights(network, settings.normalisation, ranges, None, tuple(sorted(trained)), zero)
     if len(theirs):
         weights = replace(weights, confidence=_confidence(weights, mine, theirs))
     weights.save(folder / NETWORK_FILE)
@@ -121,6 +123,7 @@ def fit(
         "held_out_subjects": sorted(held_out),
         "rows": len(mine),
         "range_deg": ranges.tolist(),
+        "pose_zero": zero,
     }
     inside = theirs.take(within_bounds(theirs.ypr_deg))
     evaluations = compare(inside, estimators(folder)) if len(inside) else []

@@ -14,6 +14,7 @@ from downstream_hpe.evaluation import BOUNDS_DEG, Estimator, constant_zero, rigi
 from downstream_hpe.fitting import estimators
 from downstream_hpe.inputs import MEDIA
 from downstream_hpe.photographs import FORMATS, LeftOut, detected_rows
+from downstream_hpe.pose_zero import pose_zero
 from downstream_hpe.predictor import Predictor, model_folder
 from downstream_hpe.tables import Rows, read_missed, read_rows
 
@@ -40,6 +41,12 @@ def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, n
     _expect_tables(Path(dataset))
     rows = read_rows(dataset, split)
     subjects, missed_deg = read_missed(dataset, split)
+    theirs = pose_zero(dataset)
+    if theirs and predictor.pose_zero and theirs != predictor.pose_zero:
+        note(
+            f"{dataset} counts angles with --frame {theirs}, the model with {predictor.pose_zero}: "
+            "a constant difference a head is to be expected, mostly in pitch"
+        )
     trained = sorted(predictor.trained_subjects)
     unseen = ~np.isin(rows.subjects, trained)
     if not unseen.any():

@@ -95,6 +95,7 @@ class Weights:
 
     range_deg: float [3, 2], the angles trained on. confidence: None where no face was held out to
     calibrate it. trained_subjects: whom the network has seen, so that nobody tests on them.
+    pose_zero: "source" or "canonical", of :mod:`downstream_hpe.pose_zero`; None: not known.
     """
 
     network: PoseNetwork
@@ -102,6 +103,7 @@ class Weights:
     range_deg: np.ndarray
     confidence: Confidence | None = None
     trained_subjects: tuple[str, ...] = ()
+    pose_zero: str | None = None
 
     def save(self, path: Path) -> None:
         """One safetensors file."""
@@ -113,6 +115,7 @@ class Weights:
             "normalisation": self.normalisation,
             "range_deg": self.range_deg.tolist(),
             "trained_subjects": list(self.trained_subjects),
+            "pose_zero": self.pose_zero,
         }
         tensors = {name: value.contiguous() for name, value in self.network.state_dict().items()}
         if self.confidence is not None:
@@ -133,9 +136,9 @@ class Weights:
             parts: dict[str, Any] = {name.removeprefix(_CONFIDENCE): a for name, a in beside.items()}
             confidence = Confidence(**{**parts, "bias": float(parts["bias"])}) if parts else None
             ranges = np.array(facts["range_deg"], dtype=float)
-            subjects = tuple(facts["trained_subjects"])
+            subjects, zero = tuple(facts["trained_subjects"]), facts.get("pose_zero")
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise ModelError(f"{path}: its weights do not fit its layers; fit the model again") from error
         if facts.get("normalisation") not in NORMALISATIONS or ranges.shape != (3, 2):
             raise ModelError(f"{path}: unknown normalisation or range; fit the model again")
-        return Weights(network.eval(), facts["normalisation"], ranges, confidence, subjects)
+        return Weights(network.eval(), facts["normalisation"], ranges, confidence, subjects, zero)

@@ -38,10 +38,16 @@ class Predictor:
 
     range_deg: float [3, 2], the angles the model was trained on; beyond them it extrapolates.
     trained_subjects: whom it has seen, so that nobody measures it on them.
+    pose_zero: "source" or "canonical", as the data it learned from; None: not known.
     """
 
     def __init__(
-        self, session: Any, range_deg: np.ndarray, trained_subjects: frozenset[str], name: str
+        self,
+        session: Any,
+        range_deg: np.ndarray,
+        trained_subjects: frozenset[str],
+        pose_zero: str | None,
+        name: str,
     ) -> None:
         self._session = session
         self._name = name
@@ -49,6 +55,7 @@ class Predictor:
         self._detector = FaceDetector()
         self.range_deg = range_deg
         self.trained_subjects = trained_subjects
+        self.pose_zero = pose_zero
 
     @staticmethod
     def load(model: Path | str = DEFAULT_MODEL, *, threads: int = 1) -> Predictor:
@@ -88,7 +95,7 @@ class Predictor:
             optional = name == "confidence" and name not in found
             if not optional and found.get(name) != ("tensor(float)", shape):
                 raise ModelError(f"{file}: {name} is not float [N{''.join(f', {n}' for n in shape)}]")
-        return Predictor(session, ranges, subjects, str(file))
+        return Predictor(session, ranges, subjects, facts.get("pose_zero"), str(file))
 
     def in_range(self, ypr_deg: np.ndarray) -> Any:
         """Whether all three angles are among those the model was trained on: float [..., 3] -> bool [...]."""

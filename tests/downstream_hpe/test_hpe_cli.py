@@ -26,6 +26,12 @@ def run(*arguments, monkeypatch):
     return stopped.value.code or 0
 
 
+def counted_from(zero, folder):
+    """Say in a dataset's manifest, as headturn build does, from where its angles count."""
+    manifest = {"configuration": {"poses": {"frame": zero}}}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+
+
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
     """Eight ideal heads, two of them for validation, a few cells not detected."""
@@ -34,6 +40,7 @@ def dataset(tmp_path_factory):
         columns = ideal.rows(face, f"s{n}", split="validation" if n > 5 else "train")
         ideal.drop(columns, n)
         ideal.write(folder / "data" / f"part-{n}.parquet", columns)
+    counted_from("canonical", folder)
     return folder
 
 
@@ -45,6 +52,7 @@ def extra(tmp_path_factory):
         columns = ideal.rows(face, f"x{n}", tuple(1.2 * axis[1:] for axis in ideal.AXES))
         columns |= {f"{angle}_index": np.full(64, -1, np.int16) for angle in ("yaw", "pitch", "roll")}
         ideal.write(folder / "data" / f"part-{n}.parquet", columns)
+    counted_from("canonical", folder)
     return folder
 
 
@@ -97,6 +105,36 @@ def test_evaluate_leaves_out_what_was_trained_on(model, dataset, tmp_path, monke
     assert "| confidence | rows | mean confidence | share below 5° | mean geodesic |" in text
     assert run("evaluate", model, dataset, "--split", "train", monkeypatch=monkeypatch) == 1
     assert "was trained on every subject" in capsys.readouterr().err
+
+
+def test_evaluate_says_that_a_dataset_counts_from_another_zero(model, dataset, tmp_path, monkeypatch, capsys):
+    from downstream_hpe.predictor import Predictor
+
+    assert Predictor.load(model).pose_zero == "canonical"
+    assert run("evaluate", model, dataset, monkeypatch=monkeypatch) == 0
+    assert "--frame" not in capsys.readouterr().err
+    (tmp_path / "data").symlink_to(dataset / "data")
+    counted_from("source", tmp_path)
+    assert run("evaluate", model, tmp_path, monkeypatch=monkeypatch) == 0
+    assert "counts angles with --frame source, the model with canonical" in capsys.readouterr().err
+
+
+def test_datasets_that_count_from_two_zeros_are_not_learned_from(
+    dataset, extra, tmp_path, monkeypatch, capsys
+):
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "data").symlink_to(extra / "data")
+    arguments = ("fit", dataset, "--out", tmp_path / "m", "--holes", "rotate", "--extra", other)
+    for zero, says in (("source", "built with --frame source, but"), (None, "not a readable manifest")):
+        counted_from(zero, other)
+        if zero is None:
+            (other / "manifest.json").write_text("{}")
+        assert run(*arguments, monkeypatch=monkeypatch) == 1
+        error = capsys.readouterr().err
+        assert says in error
+        assert error.count("\n") == 1
+        assert not (tmp_path / "m").exists()
 
 
 def test_export_writes_what_predictor_reads(model, dataset, tmp_path, monkeypatch, capsys):
