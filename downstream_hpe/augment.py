@@ -42,14 +42,14 @@ class Disturbances:
     stretch and depth relative.
     """
 
-    turn_deg: float = 6.0
+    turn_deg: float = 4.0
     mirror: float = 0.5
-    shape: float = 1.0
-    stretch: float = 0.06
-    depth: float = 0.08
-    lean: float = 0.03
+    shape: float = 0.3
+    stretch: float = 0.03
+    depth: float = 0.04
+    lean: float = 0.015
     lens: float = 0.02
-    jitter: float = 0.02
+    jitter: float = 0.005
 
 
 NONE = Disturbances(turn_deg=0, mirror=0, shape=0, stretch=0, depth=0, lean=0, lens=0, jitter=0)

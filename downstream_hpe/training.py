@@ -44,7 +44,7 @@ class Recipe:
 
     layers: tuple[int, ...] = (1404, 384, 128, 64, 9)
     head_layers: tuple[int, ...] = (3, 64, 64, 1)
-    epochs: int = 40
+    epochs: int = 30
     batch: int = 256
     learning_rate: float = 2e-3
     weight_decay: float = 1e-2
@@ -53,8 +53,8 @@ class Recipe:
     continuous: bool = True
     disturbances: Disturbances = field(default_factory=Disturbances)
     rotation_weight: float = 1.0
-    components: int = 256
-    floor: float = 0.03
+    components: int = 400
+    floor: float = 0.01
 
 
 PAPER = Recipe(
