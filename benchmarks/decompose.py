@@ -15,18 +15,23 @@ import resource
 import subprocess
 import sys
 import time
-import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
-from downstream_hpe.decomposition import PAPER_RANKS, Decomposition, decompose
+from downstream_hpe.decomposition import PAPER_RANKS, decompose
 from downstream_hpe.normalise import FEATURES, normalise
 from downstream_hpe.rotation import rotation_from_angles
 from downstream_hpe.tensor import ArrayTensor
 
 AXES = (np.arange(-50, 51, 10), np.arange(-40, 41, 10), np.arange(-30, 31, 10))
 NOISE = 0.01
+REPEATS = 3
+"""Timed runs of every method, in turn; the best counts."""
+
+Fit = Callable[[int], np.ndarray]
+"""A head's number to its fitted slab."""
 
 
 class SyntheticTensor:
@@ -63,35 +68,41 @@ def compare(heads: int) -> bool:
     values = np.stack(list(SyntheticTensor(heads).slabs()))
     tensor = ArrayTensor(values, np.ones(values.shape[:4], dtype=bool))
     print(f"tensor {' x '.join(map(str, values.shape))} {values.dtype}, {values.nbytes / 1e6:.0f} MB")
-    times = []
-    for _ in range(3):
-        start = time.perf_counter()
-        ours: Decomposition = decompose(tensor)
-        times.append(time.perf_counter() - start)
-    seconds = min(times)
-    error = relative_error(values, (ours.slab(n) for n in range(heads)))
-    print(f"{'streamed ST-HOSVD':32} {seconds:8.2f} s   error {error:.6f}")
-    ratios = []
-    cases = [("start only (HOSVD)", {"n_iter_max": 1}), ("as it comes (HOOI)", {})]
-    for name, options in cases:
-        start = time.perf_counter()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+
+    def peer(**options: Any) -> Callable[[], Fit]:
+        def fit() -> Fit:
             (core, factors), _ = partial_tucker(values, PAPER_RANKS, modes=[0, 1, 2, 3], **options)
-        theirs = time.perf_counter() - start
-        fitted = (
-            multi_mode_dot(core, [factors[0][n : n + 1], *factors[1:]], modes=[0, 1, 2, 3])[0]
-            for n in range(heads)
-        )
-        other = relative_error(values, fitted)
-        ratios.append((theirs / seconds, abs(error - other)))
-        print(
-            f"{f'tensorly {tensorly.__version__} {name}':32} {theirs:8.2f} s   error {other:.6f}"
-            f"   {theirs / seconds:6.1f}x slower, errors {error - other:+.1e} apart"
-        )
-    ratio, apart = ratios[-1]
-    good = ratio >= 100 and apart <= 1e-4
-    print(f"at least 100x faster within 1e-4: {'yes' if good else 'NO'} ({ratio:.0f}x, {apart:.1e})")
+            return lambda n: multi_mode_dot(core, [factors[0][n], *factors[1:]], modes=[0, 1, 2, 3])
+
+        return fit
+
+    name = f"tensorly {tensorly.__version__}"
+    methods: dict[str, Callable[[], Fit]] = {
+        "streamed ST-HOSVD": lambda: decompose(tensor).slab,
+        f"{name} as it comes": peer(),
+        # No promise of the best fit, as an SVD start has one, but mostly the same in less time.
+        f"{name} from a random start": peer(init="random", random_state=0),
+    }
+    seconds = dict.fromkeys(methods, np.inf)
+    fits: dict[str, Fit] = {}
+    for _ in range(REPEATS):
+        for name, method in methods.items():
+            time.sleep(0.3)  # threads of BLAS spin for a while after a call, and would slow the next down
+            start = time.perf_counter()
+            fits[name] = method()
+            seconds[name] = min(seconds[name], time.perf_counter() - start)
+    errors = {name: relative_error(values, (fit(n) for n in range(heads))) for name, fit in fits.items()}
+    ours, usual, quickest = methods
+    ratios = {name: seconds[name] / seconds[ours] for name in methods}
+    for name in methods:
+        print(f"{name:36} {seconds[name]:7.3f} s   error {errors[name]:.6f}   {ratios[name]:6.1f}x")
+    apart = abs(errors[usual] - errors[ours])
+    good = ratios[usual] >= 100 and apart <= 1e-4
+    print(
+        f"at least 100x faster than tensorly as it comes, within 1e-4: {'yes' if good else 'NO'} "
+        f"({ratios[usual]:.0f}x, {apart:.1e}); {ratios[quickest]:.0f}x faster than from a random start "
+        f"({abs(errors[quickest] - errors[ours]):.1e})"
+    )
     return good
 
 

@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Singular value decomposition of a matrix whose rows arrive one by one."""
+"""Leading vectors from Gram matrices, also of a matrix whose rows arrive one by one."""
 
 from __future__ import annotations
 
 import numpy as np
+
+
+def leading(gram: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
+    """All eigenvalues, largest first and never negative, and the leading eigenvectors [D, rank]."""
+    values, vectors = np.linalg.eigh(gram)
+    # A copy, because numpy multiplies by a reversed view without BLAS.
+    return np.maximum(values[::-1], 0.0), vectors[:, ::-1][:, :rank].copy()
 
 
 class RowSpace:
@@ -46,8 +53,7 @@ class RowSpace:
         parts = [] if self._scaled is None else [self._scaled]
         stacked = np.concatenate([*parts, *(row[None] for row in self._rows)], dtype=np.float64)
         self._rows.clear()
-        values, vectors = np.linalg.eigh(stacked @ stacked.T)
-        values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1][:, :keep]
+        values, vectors = leading(stacked @ stacked.T, keep)
         self._scaled = vectors.T @ stacked
         kept = len(stacked) - count
         left = np.zeros((old + count, len(stacked)))

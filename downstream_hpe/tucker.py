@@ -8,18 +8,28 @@ The feature mode is kept whole, so W [Ri, Ry, Rp, Rr, F] is all that is needed o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
-from downstream_hpe.rowspace import RowSpace
+from downstream_hpe.rowspace import RowSpace, leading
 from downstream_hpe.tensor import Slabs
 
+S = TypeVar("S")
+T = TypeVar("T")
 Ranks = tuple[int, int, int, int]
 
 KEPT_BYTES = 256e6
 """A contracted tensor up to this size is kept between passes."""
+
+THREADS = min(4, os.cpu_count() or 1)
+"""Heads worked on at once; as many again wait in memory."""
 
 
 @dataclass(frozen=True)
@@ -84,20 +94,38 @@ class _Projected:
         """Contract with the transpose of a factor from now on."""
         self._factors.append((mode, factor))
 
-    def __iter__(self) -> Iterator[np.ndarray]:
+    def map(self, function: Callable[[np.ndarray], np.ndarray]) -> Iterator[np.ndarray]:
+        """function of each slab, in order."""
         self.reads += self._kept is None
-        source = self._tensor.slabs() if self._kept is None else iter(self._kept)
+        source = self._tensor.slabs() if self._kept is None else self._kept
+        factors = self._factors
         keep: list[np.ndarray] = []
         fits = True
-        for slab in source:
-            for mode, factor in self._factors:
+
+        def work(slab: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            for mode, factor in factors:
                 slab = _times(slab, factor.T, mode)
+            return slab, function(slab)
+
+        for slab, value in _in_threads(work, source):
             fits = fits and slab.nbytes * self._tensor.shape[0] <= KEPT_BYTES
             if fits:
                 keep.append(slab)
-            yield slab
+            yield value
         if fits:
             self._kept, self._factors = keep, []
+
+
+def _in_threads(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
+    """function of each item, in order whatever the threads do, so that sums have the same bits."""
+    pending: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(THREADS) as pool:
+        for item in items:
+            pending.append(pool.submit(function, item))
+            if len(pending) > 2 * THREADS:
+                yield pending.popleft().result()
+        for future in pending:
+            yield future.result()
 
 
 def sequential(tensor: Slabs, ranks: Ranks) -> Decomposition:
@@ -108,9 +136,9 @@ def sequential(tensor: Slabs, ranks: Ranks) -> Decomposition:
     total = lost = 0.0
     for mode in range(3):
         gram = np.zeros((tensor.shape[mode + 1],) * 2)
-        for slab in projected:
-            gram += _gram(slab, mode)
-        values, vectors = _leading(gram, ranks[mode + 1])
+        for part in projected.map(partial(_gram, mode=mode)):
+            gram += part
+        values, vectors = leading(gram, ranks[mode + 1])
         # The first trace is |T|^2: nothing has been truncated yet.
         total = total or float(np.trace(gram))
         lost += float(values[ranks[mode + 1] :].sum())
@@ -118,8 +146,8 @@ def sequential(tensor: Slabs, ranks: Ranks) -> Decomposition:
         energies.append(values / total)
         projected.contract(mode, vectors)
     rows = RowSpace()
-    for slab in projected:
-        rows.add(slab.ravel())
+    for row in projected.map(np.ravel):
+        rows.add(row)
     left, singular, right = rows.finish(ranks[0])
     core = (singular[: ranks[0], None] * right).reshape(*ranks, tensor.shape[4])
     error = np.sqrt((lost + rows.dropped) / total)
@@ -140,7 +168,7 @@ def refine(tensor: Slabs, fit: Decomposition, rounds: int) -> Decomposition:
         for mode in range(3):
             others = [np.eye(len(f)) if k == mode else f for k, f in enumerate(poses)]
             gram = np.sum([_gram(_project(part, others), mode) for part in seen], axis=0)
-            _, poses[mode] = _leading(gram, poses[mode].shape[1])
+            _, poses[mode] = leading(gram, poses[mode].shape[1])
         rows = RowSpace()
         for slab in tensor.slabs():
             rows.add(_project(slab, poses).ravel())
@@ -154,9 +182,7 @@ def refine(tensor: Slabs, fit: Decomposition, rounds: int) -> Decomposition:
 
 def _times(x: np.ndarray, matrix: np.ndarray, mode: int) -> np.ndarray:
     """x contracted along one axis with matrix [R, D]: the axis becomes R long."""
-    before = int(np.prod(x.shape[:mode]))
-    y = matrix.astype(x.dtype, copy=False) @ x.reshape(before, x.shape[mode], -1)
-    return y.reshape(*x.shape[:mode], len(matrix), *x.shape[mode + 1 :])
+    return np.moveaxis(matrix.astype(x.dtype, copy=False) @ np.moveaxis(x, mode, -2), -2, mode)
 
 
 def _project(slab: np.ndarray, poses: list[np.ndarray]) -> np.ndarray:
@@ -166,16 +192,14 @@ def _project(slab: np.ndarray, poses: list[np.ndarray]) -> np.ndarray:
     return slab
 
 
-def _gram(x: np.ndarray, mode: int) -> np.ndarray:
-    """X X^T of the unfolding of x along one axis: [D, D]."""
-    rows = x.reshape(int(np.prod(x.shape[:mode])), x.shape[mode], -1)
-    return (rows @ np.swapaxes(rows, -1, -2)).sum(axis=0, dtype=np.float64)
+def _gram(slab: np.ndarray, mode: int) -> np.ndarray:
+    """X X^T of the unfolding of slab [Dy, Dp, Dr, F] along one pose axis: float64 [D, D].
 
-
-def _leading(gram: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
-    """All eigenvalues, largest first and never negative, and the leading eigenvectors [D, rank]."""
-    values, vectors = np.linalg.eigh(gram)
-    return np.maximum(values[::-1], 0.0), vectors[:, ::-1][:, :rank]
+    Products over F alone, summed in float64: single precision is not left to add up, and BLAS does
+    such small ones in the thread that calls it.
+    """
+    x = np.moveaxis(slab, mode, -2)
+    return (x @ np.swapaxes(x, -1, -2)).sum(axis=(0, 1), dtype=np.float64)
 
 
 def _with_signs(

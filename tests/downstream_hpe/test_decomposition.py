@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import weakref
+
 import ideal
 import numpy as np
 import pytest
@@ -68,6 +70,31 @@ def test_signs_do_not_depend_on_the_run(noisy, monkeypatch):
     assert (first.passes, second.passes) == (1, 4)
     for one, other in zip((first.core, *first.poses), (second.core, *second.poses), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-8 * np.abs(one).max())
+
+
+def test_threads_change_no_bit(noisy, monkeypatch):
+    several = decompose(noisy)
+    monkeypatch.setattr(tucker, "THREADS", 1)
+    single = decompose(noisy)
+    for one, other in zip((several.core, *several.poses), (single.core, *single.poses), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_only_a_few_heads_are_in_memory_at_once(noisy, monkeypatch):
+    class Streamed(ArrayTensor):
+        def slabs(self):
+            heads = []
+            for slab in self.values:
+                heads.append(weakref.ref(fresh := slab.copy()))
+                yield fresh
+                del fresh
+                alive.append(sum(head() is not None for head in heads))
+
+    alive: list[int] = []
+    monkeypatch.setattr(tucker, "KEPT_BYTES", 0)
+    monkeypatch.setattr(tucker, "THREADS", 2)
+    decompose(Streamed(noisy.values, noisy.observed))
+    assert max(alive) <= 2 * 2 + 2  # and the one that is read, and the one that was handed over
 
 
 def test_missing_cells_are_recovered(clean):

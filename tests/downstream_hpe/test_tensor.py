@@ -186,11 +186,20 @@ def test_foreign_or_mixed_tables_are_refused(tmp_path, heads, key, value, messag
 def test_one_identity_nothing_there_and_no_parquet(tmp_path, heads):
     with pytest.raises(DataError, match="1 heads on a grid"):
         open_tensor(write_heads(tmp_path / "one", {"amy": heads["amy"]}))
-    with pytest.raises(DataError, match=r"no \.parquet file"):
+    with pytest.raises(DataError, match="nowhere: not there"):
         open_tensor(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(DataError, match=r"no \.parquet file"):
+        open_tensor(tmp_path / "empty")
     (tmp_path / "bad.parquet").write_bytes(b"PAR1 no")
     with pytest.raises(DataError, match="not a readable Parquet file"):
         open_tensor(tmp_path / "bad.parquet")
+    ideal.write(tmp_path / "damaged.parquet", heads["amy"])
+    damaged = bytearray((tmp_path / "damaged.parquet").read_bytes())
+    damaged[4:20_000] = bytes(19_996)
+    (tmp_path / "damaged.parquet").write_bytes(damaged)
+    with pytest.raises(DataError, match=r"damaged\.parquet: damaged; headturn verify"):
+        read_rows(tmp_path / "damaged.parquet")
 
 
 def test_rows_leave_out_the_undetected_and_keep_the_split(tmp_path, heads):
