@@ -27,7 +27,7 @@ from downstream_hpe.tensor import ArrayTensor
 
 AXES = (np.arange(-50, 51, 10), np.arange(-40, 41, 10), np.arange(-30, 31, 10))
 NOISE = 0.01
-REPEATS = 3
+REPEATS = 5
 """Timed runs of every method, in turn; the best counts."""
 
 Fit = Callable[[int], np.ndarray]

@@ -25,8 +25,8 @@ COMPONENTS = 24
 """Directions in which level faces differ, the pose's own distortions among them."""
 TURNS = 3
 QUANTITIES = ("outside", "shape", "turn", "yaw", "pitch", "roll", "beyond yaw", "beyond pitch", "beyond roll")
-FLOORS = np.array([0.5, 0.5, 0.3, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0])
-"""Least weights: about half a unit of the logit for a typical residual, 4 for BEYOND_DEG beyond the range."""
+FLOORS = np.array([0.5, 0.5, 0.3, 0.0, 0.0, 0.0, 8.0, 8.0, 8.0])
+"""Least weights: about half a unit of the logit for a typical residual, 8 for BEYOND_DEG beyond the range."""
 BEYOND_DEG = 20.0
 PRIOR = 1e-3
 _SAMPLE = 4000

@@ -87,7 +87,7 @@ class _Projected:
     def __init__(self, tensor: Slabs) -> None:
         self.reads = 0
         self._tensor = tensor
-        self._kept: list[np.ndarray] | None = None
+        self._kept: deque[np.ndarray] | None = None
         self._factors: list[tuple[int, np.ndarray]] = []
 
     def contract(self, mode: int, factor: np.ndarray) -> None:
@@ -97,9 +97,11 @@ class _Projected:
     def map(self, function: Callable[[np.ndarray], np.ndarray]) -> Iterator[np.ndarray]:
         """function of each slab, in order."""
         self.reads += self._kept is None
-        source = self._tensor.slabs() if self._kept is None else self._kept
+        kept = self._kept
+        # Let go one by one: fresh memory is slow, and what is kept next takes theirs.
+        source = self._tensor.slabs() if kept is None else (kept.popleft() for _ in range(len(kept)))
         factors = self._factors
-        keep: list[np.ndarray] = []
+        keep: deque[np.ndarray] = deque()
         fits = True
 
         def work(slab: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
