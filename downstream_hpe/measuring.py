@@ -14,7 +14,7 @@ from downstream_hpe.evaluation import BOUNDS_DEG, Estimator, constant_zero, rigi
 from downstream_hpe.fitting import estimators
 from downstream_hpe.inputs import MEDIA
 from downstream_hpe.photographs import FORMATS, LeftOut, detected_rows
-from downstream_hpe.pose_zero import pose_zero
+from downstream_hpe.pose_zero import MANIFEST, pose_zero
 from downstream_hpe.predictor import Predictor, model_folder
 from downstream_hpe.tables import Rows, read_missed, read_rows
 
@@ -108,6 +108,8 @@ def model_estimators(model: str, predictor: Predictor, reference: np.ndarray | N
 
 def _expect_tables(path: Path) -> None:
     """UsageError where there are pictures and no tables. What else is wrong the reader of tables says."""
+    if (path / MANIFEST).is_file():
+        return  # beside its tables a dataset may hold millions of pictures, not to be listed
     below = path.rglob("*") if path.is_dir() else [path]
     suffixes = {file.suffix.lower() for file in below}
     if suffixes & (MEDIA | {".mat", ".npz"}) and ".parquet" not in suffixes:
