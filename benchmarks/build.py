@@ -23,8 +23,8 @@ from pathlib import Path
 import psutil
 from resident import Resident
 
-from generator.execution.build import build
-from generator.execution.open_executor import open_executor
+from generator.execution.build.run import build
+from generator.execution.executors.open import open_executor
 from generator.heads.parametric.make import make_heads
 from generator.plan.config import load_config
 from generator.process import available_cores

@@ -24,7 +24,7 @@ from pathlib import Path
 import psutil
 from resident import Resident
 
-from generator.dataset.manifest import read_manifest
+from generator.dataset.format.manifest import read_manifest
 
 HEADTURN = [sys.executable, "-m", "generator.cli"]
 

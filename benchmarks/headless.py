@@ -19,8 +19,8 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from generator.dataset.files import file_sha256
-from generator.dataset.manifest import read_manifest
+from generator.dataset.format.files import file_sha256
+from generator.dataset.format.manifest import read_manifest
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMAND = ("--background", "--command", "headturn")

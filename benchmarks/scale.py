@@ -24,16 +24,16 @@ from typing import Any
 
 import numpy as np
 
-from generator.dataset.part import UnitRows, commit_unit
-from generator.dataset.schema import part_schema
-from generator.dataset.verify import verify_dataset
-from generator.execution.build import build
-from generator.execution.prepare import Prepared
-from generator.execution.receipts import Receipts, split_done
-from generator.execution.slot import Outcome
+from generator.dataset.format.part import UnitRows, commit_unit
+from generator.dataset.format.schema import part_schema
+from generator.dataset.proof.verify import verify_dataset
+from generator.execution.build.receipts import Receipts, split_done
+from generator.execution.build.run import build
+from generator.execution.lanes.slot import Outcome
 from generator.geometry.camera import Camera
 from generator.landmarks.anchors import no_anchors
 from generator.landmarks.detector import POINTS
+from generator.placing.face import Prepared
 from generator.plan.config import load_config
 from generator.process import resident_mib
 
@@ -50,7 +50,7 @@ class NoRenderer:
         self.orders: list[dict[str, Any]] = []
 
     def run(self, orders: Sequence[dict[str, Any]], on_frame: Any) -> Iterator[Outcome]:
-        """See generator.execution.executor.Executor."""
+        """See generator.execution.executors.executor.Executor."""
         receipts = {"versions": self._versions, "prepare": self._prepare, "build": self._build}
         for order in orders:
             yield Outcome(order, receipts[order["op"]](order))

@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow.parquet as pq
 from scipy.optimize import linear_sum_assignment
 
-from generator.dataset.anchors_table import read_anchors
+from generator.dataset.format.anchors_table import read_anchors
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, graphics_rotation, rotation_from_angles
 from generator.landmarks.detector import LEFT_EYE_OUTER, POINTS, RIGHT_EYE_OUTER
 

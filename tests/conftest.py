@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from placed_head import PlacedHead
 
-from generator.execution.prepare import prepare
-from generator.execution.renderer import Renderer
+from generator.execution.lanes.renderer import Renderer
 from generator.heads.parametric.make import make_heads
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
+from generator.placing.face import prepare
 
 SHARED_HEADS = Path(__file__).resolve().parents[2] / "shared" / "heads"
 

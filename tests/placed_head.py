@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from generator.execution.prepare import Prepared
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
+from generator.placing.face import Prepared
 
 
 @dataclass(frozen=True)

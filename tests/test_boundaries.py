@@ -18,8 +18,10 @@ MAY_IMPORT = {
     "heads": {"geometry"},
     "blender": {"plan", "heads", "geometry"},
     "landmarks": {"plan", "heads", "geometry"},
-    "dataset": {"plan", "heads", "geometry"},
-    "execution": {"blender", "landmarks", "dataset", "plan", "heads", "geometry"},
+    "dataset": {"landmarks", "plan", "heads", "geometry"},
+    "placing": {"landmarks", "plan", "heads", "geometry"},
+    "execution": {"blender", "placing", "landmarks", "dataset", "plan", "heads", "geometry"},
+    "cli": {"execution", "blender", "placing", "landmarks", "dataset", "plan", "heads", "geometry"},
 }
 
 

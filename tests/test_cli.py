@@ -147,7 +147,7 @@ class Hidden:
             raise ModuleNotFoundError(name)
 
 sys.meta_path.insert(0, Hidden())
-from generator.cli import main
+from generator.cli.app import main
 main()
 """
     python = [sys.executable, "-c", program]

@@ -10,21 +10,21 @@ from typing import Any
 import cv2
 import numpy as np
 
-from generator.dataset.anchors_table import read_anchors
-from generator.dataset.files import file_sha256, write_bytes
-from generator.dataset.heads_table import HeadRow, read_heads
-from generator.dataset.manifest import Manifest, read_manifest
-from generator.dataset.open import as_array, image_bytes, read_samples
-from generator.dataset.part import read_part
+from generator.dataset.format.anchors_table import read_anchors
+from generator.dataset.format.files import file_sha256, write_bytes
+from generator.dataset.format.heads_table import HeadRow, read_heads
+from generator.dataset.format.manifest import Manifest, read_manifest
+from generator.dataset.format.open import as_array, image_bytes, read_samples
+from generator.dataset.format.part import read_part
 from generator.errors import DatasetError, HeadError, UsageError, WorkerError
-from generator.execution.folder import MADE_HEADS
-from generator.execution.lane import head_to_json
-from generator.execution.open_executor import open_executor
-from generator.execution.prepare import Prepared
-from generator.execution.scratch import scratch_folder
+from generator.execution.build.folder import MADE_HEADS
+from generator.execution.executors.open import open_executor
+from generator.execution.lanes.lane import head_to_json
+from generator.execution.lanes.scratch import scratch_folder
 from generator.heads.head import Head
 from generator.heads.source import find_heads
 from generator.landmarks.anchors import pack
+from generator.placing.face import Prepared
 from generator.plan.config import PARAMETRIC, BuildConfig, load_config
 
 COMPARED = ("landmarks", "landmarks_exact")

@@ -16,7 +16,7 @@ import psutil
 import pytest
 from real_blender import RealBlender
 
-from generator.execution.lock import locked
+from generator.execution.build.lock import locked
 
 HERE = Path(__file__).parent
 sys.path.append(str(HERE.parent / "heads"))

@@ -18,7 +18,7 @@ from blender_addon.core.process import HostProcess
 from blender_addon.core.progress import Progress, duration
 from generator import __version__
 from generator.errors import UsageError, WorkerError
-from generator.execution.preview_server import PreviewServer
+from generator.execution.preview.server import PreviewServer
 from generator.plan.config import BuildConfig, load_config
 
 ROOT = Path(__file__).resolve().parents[2]

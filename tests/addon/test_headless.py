@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from real_blender import ROOT, RealBlender
 
-from generator.dataset.manifest import read_manifest
+from generator.dataset.format.manifest import read_manifest
 
 MODULE = "bl_ext.user_default.headturn"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from real_blender import ROOT, RealBlender
 
-from generator.dataset.verify import verify_dataset
+from generator.dataset.proof.verify import verify_dataset
 from generator.plan.config import load_config
 
 OUT = ROOT / ".test-output" / "addon"

@@ -18,7 +18,7 @@ import pytest
 from placed_head import PlacedHead
 from real_blender import ROOT
 
-from generator.execution.lines import LineProcess
+from generator.execution.lanes.lines import LineProcess
 from generator.heads.package import save_package
 from generator.plan.config import BuildConfig, config_toml, load_config
 from generator.plan.render_settings import RenderSettings

@@ -9,9 +9,15 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from generator.dataset.passes import PASSES, passes_from_blender, passes_sha256, read_channels, write_passes
+from generator.dataset.format.passes import (
+    PASSES,
+    passes_from_blender,
+    passes_sha256,
+    read_channels,
+    write_passes,
+)
 from generator.errors import WorkerError
-from generator.execution.renderer import Renderer
+from generator.execution.lanes.renderer import Renderer
 from generator.geometry.camera import Camera, Projection, framing_distance
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh, Material

@@ -13,7 +13,7 @@ import pytest
 from placed_head import PlacedHead
 
 from generator.errors import HeadError
-from generator.execution.renderer import Renderer
+from generator.execution.lanes.renderer import Renderer
 from generator.geometry.camera import Camera, framing_distance
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh, Material

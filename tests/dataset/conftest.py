@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from small_dataset import HEADS, SMALL_PLAN, build_dataset, unit_rows
 
-from generator.dataset.manifest import Manifest
-from generator.dataset.part import UnitRows
+from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.part import UnitRows
 
 
 @pytest.fixture(scope="session")

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from generator.dataset.anchors_table import HeadAnchors, write_anchors
-from generator.dataset.card import write_card
-from generator.dataset.heads_table import HeadRow, write_heads
-from generator.dataset.manifest import (
+from generator.dataset.format.anchors_table import HeadAnchors, write_anchors
+from generator.dataset.format.heads_table import HeadRow, write_heads
+from generator.dataset.format.manifest import (
     Manifest,
     common_configuration,
     configuration_digest,
     write_manifest,
 )
-from generator.dataset.part import UnitRows, commit_unit
-from generator.dataset.schema import ImageMode, part_schema
+from generator.dataset.format.part import UnitRows, commit_unit
+from generator.dataset.format.schema import ImageMode, part_schema
+from generator.dataset.show.card import write_card
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import rotation_from_angles
 from generator.plan.poses import PosePlan, grid_plan, write_poses_csv

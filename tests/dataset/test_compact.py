@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.dataset.compact import compact_dataset
-from generator.dataset.manifest import read_manifest
-from generator.dataset.verify import verify_dataset
+from generator.dataset.format.compact import compact_dataset
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError
 
 

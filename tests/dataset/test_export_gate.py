@@ -242,7 +242,7 @@ def test_the_command(dataset, tmp_path, monkeypatch, capsys):
 
 
 def test_choices_of_the_command_are_the_formats():
-    from generator.cli_export import FormatName
+    from generator.cli.export import FormatName
 
     assert [name.value for name in FormatName] == list(FORMATS)
 

@@ -8,9 +8,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from generator.dataset.card import write_card
-from generator.dataset.heads_table import HEADS_SCHEMA, read_heads, write_heads
-from generator.dataset.manifest import configuration_digest, portable_command, read_manifest, write_manifest
+from generator.dataset.format.heads_table import HEADS_SCHEMA, read_heads, write_heads
+from generator.dataset.format.manifest import (
+    configuration_digest,
+    portable_command,
+    read_manifest,
+    write_manifest,
+)
+from generator.dataset.show.card import write_card
 from generator.errors import DatasetError
 
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.dataset.missing import exact_in_pixels, fill_missing, rotated_frontal
-from generator.dataset.open import as_array
-from generator.dataset.part import UnitRows, unit_table
-from generator.dataset.schema import part_schema
+from generator.dataset.format.missing import exact_in_pixels, fill_missing, rotated_frontal
+from generator.dataset.format.open import as_array
+from generator.dataset.format.part import UnitRows, unit_table
+from generator.dataset.format.schema import part_schema
 from generator.errors import UsageError
 from generator.geometry.rigid import fit_similarity
 from generator.geometry.rotation import geodesic_deg

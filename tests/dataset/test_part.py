@@ -13,10 +13,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from generator.dataset.digest import add_digests, content_digest
-from generator.dataset.open import as_array
-from generator.dataset.part import check_part, commit_unit, read_part, unit_table, write_part
-from generator.dataset.schema import part_schema
+from generator.dataset.format.digest import add_digests, content_digest
+from generator.dataset.format.open import as_array
+from generator.dataset.format.part import check_part, commit_unit, read_part, unit_table, write_part
+from generator.dataset.format.schema import part_schema
 from generator.errors import DatasetError
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 
@@ -167,7 +167,7 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 import pyarrow as pa
-from generator.dataset.part import write_part
+from generator.dataset.format.part import write_part
 from generator.errors import DatasetError
 table = pa.ipc.open_file(sys.argv[1]).read_all()
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))

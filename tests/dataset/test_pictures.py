@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
-from generator.dataset.detection import tally_detection
-from generator.dataset.manifest import read_manifest
-from generator.dataset.open import image_bytes, read_rows, read_samples
-from generator.dataset.pictures import (
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.format.open import image_bytes, read_rows, read_samples
+from generator.dataset.show.detection import tally_detection
+from generator.dataset.show.pictures import (
     ANCHOR_TILE,
     DOT,
     GAP,

@@ -21,8 +21,8 @@ from scipy.spatial.transform import Rotation
 from small_dataset import CAMERA, HEADS, face_points
 
 from generator import cli
-from generator.dataset.report.page import page_text, report_data, write_report
-from generator.dataset.report.regions import REGIONS
+from generator.dataset.show.report.page import page_text, report_data, write_report
+from generator.dataset.show.report.regions import REGIONS
 from generator.errors import DatasetError
 from generator.plan.poses import PosePlan, grid_plan
 
@@ -158,7 +158,7 @@ def test_poses_off_the_grid_are_binned(tmp_path, build):
 
 
 def test_times_come_from_the_log(tmp_path, build):
-    from generator.dataset.report.facts import timings
+    from generator.dataset.show.report.facts import timings
 
     log = tmp_path / "build.log"
     assert timings(log) is None
@@ -181,8 +181,8 @@ def test_the_page_carries_everything_and_nothing_of_the_network(known, tmp_path)
 
 
 def test_many_heads_keep_the_page_small(known):
-    from generator.dataset.report.atlas import NUMBERS, Atlas
-    from generator.dataset.report.cells import PoseCells
+    from generator.dataset.show.report.atlas import NUMBERS, Atlas
+    from generator.dataset.show.report.cells import PoseCells
 
     heads = [replace(HEADS[0], subject=f"p{k}") for k in range(2000)]
     atlas = Atlas(heads, PoseCells.of(grid_plan((-50, 50, 10), (-40, 40, 10), (-30, 30, 10))))

@@ -15,11 +15,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from generator.dataset.anchors_table import read_anchors, write_anchors
-from generator.dataset.heads_table import read_heads, write_heads
-from generator.dataset.manifest import read_manifest, write_manifest
-from generator.dataset.part import check_part, read_part
-from generator.dataset.verify import VerifyReport, verify_dataset
+from generator.dataset.format.anchors_table import read_anchors, write_anchors
+from generator.dataset.format.heads_table import read_heads, write_heads
+from generator.dataset.format.manifest import read_manifest, write_manifest
+from generator.dataset.format.part import check_part, read_part
+from generator.dataset.proof.verify import VerifyReport, verify_dataset
 from generator.errors import DatasetError
 from generator.plan.poses import sobol_plan
 

@@ -215,7 +215,7 @@ def test_rows_leave_out_the_undetected_and_keep_the_split(tmp_path, heads):
 
 
 def test_the_contract_is_what_the_generator_writes(tmp_path):
-    schema = pytest.importorskip("generator.dataset.schema")
+    schema = pytest.importorskip("generator.dataset.format.schema")
     written = schema.part_schema("none", {}, "")
     assert written.metadata[b"headturn.schema_version"].decode().split(".")[0] == SCHEMA_MAJOR
     assert written.metadata[b"headturn.landmark_topology"].decode() == TOPOLOGY

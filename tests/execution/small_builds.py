@@ -17,10 +17,10 @@ from typing import Any
 
 import psutil
 
-from generator.execution.build import BuildResult, build
-from generator.execution.executor import Executor
-from generator.execution.open_executor import open_executor
-from generator.execution.scratch import remove_leftovers
+from generator.execution.build.run import BuildResult, build
+from generator.execution.executors.executor import Executor
+from generator.execution.executors.open import open_executor
+from generator.execution.lanes.scratch import remove_leftovers
 from generator.plan.config import BuildConfig, config_toml, load_config
 
 ROOT = Path(__file__).resolve().parents[2]

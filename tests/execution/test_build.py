@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 import pytest
 from small_builds import Quiet, config_for, run
 
-from generator.dataset.manifest import MANIFEST_FILE, read_manifest
-from generator.dataset.verify import verify_dataset
+from generator.dataset.format.manifest import MANIFEST_FILE, read_manifest
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError, HeadError, UsageError
-from generator.execution.build import build
-from generator.execution.local import LocalExecutor
-from generator.execution.open_executor import open_executor
+from generator.execution.build.run import build
+from generator.execution.executors.local import LocalExecutor
+from generator.execution.executors.open import open_executor
 from generator.plan.config import BuildConfig
 
 
@@ -113,7 +113,7 @@ def test_axes_and_units_are_found(parametric_heads: Path, tmp_path: Path) -> Non
 
     import numpy as np
 
-    from generator.dataset.heads_table import read_heads
+    from generator.dataset.format.heads_table import read_heads
 
     source = sorted(p for p in parametric_heads.iterdir() if p.is_dir())[0]
     copy = tmp_path / "blenderish"

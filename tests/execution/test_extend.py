@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from small_builds import Quiet, config_for, run
 
-from generator.dataset.manifest import read_manifest
-from generator.dataset.verify import verify_dataset
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError
-from generator.execution.chunks import Earlier, assign_chunks, cut
+from generator.execution.build.chunks import Earlier, assign_chunks, cut
 from generator.plan.config import BuildConfig
 from generator.plan.poses import csv_plan, grid_plan, poses_csv, uniform_plan
 

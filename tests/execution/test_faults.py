@@ -18,12 +18,12 @@ import psutil
 import pytest
 from small_builds import ROOT, Host, Quiet, host, run
 
-from generator.dataset.manifest import read_manifest
-from generator.dataset.verify import verify_dataset
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError
-from generator.execution.folder import CONFIG_FILE
-from generator.execution.lock import LOCK_FILE
-from generator.execution.prepared_heads import PREPARED_FILE
+from generator.execution.build.folder import CONFIG_FILE
+from generator.execution.build.lock import LOCK_FILE
+from generator.execution.build.prepared_heads import PREPARED_FILE
 from generator.execution.stopping import Stopped, stoppable
 from generator.plan.config import BuildConfig
 
@@ -166,7 +166,7 @@ def test_a_lane_that_hangs_is_replaced(built: Built, tmp_path: Path) -> None:
     with host(built[0], looked_at(built, tmp_path / "d"), "--workers", "1", "--deadline", "8") as started:
         while not any("execution.lane" in " ".join(p.cmdline()) for p in started.workers()):
             time.sleep(0.05)
-        [lane] = [p for p in started.workers() if "generator.execution.lane_main" in p.cmdline()]
+        [lane] = [p for p in started.workers() if "generator.execution.lanes.lane_main" in p.cmdline()]
         lane.suspend()
         assert started.wait() == 0, started.text()
         assert not started.orphans()

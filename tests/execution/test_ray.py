@@ -13,13 +13,13 @@ import psutil
 import pytest
 from small_builds import Quiet
 
-from generator.dataset.manifest import read_manifest
-from generator.dataset.verify import verify_dataset
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import UsageError
-from generator.execution.build import build
-from generator.execution.folder import CONFIG_FILE
-from generator.execution.open_executor import open_executor
-from generator.execution.prepared_heads import PREPARED_FILE
+from generator.execution.build.folder import CONFIG_FILE
+from generator.execution.build.prepared_heads import PREPARED_FILE
+from generator.execution.build.run import build
+from generator.execution.executors.open import open_executor
 from generator.plan.config import BuildConfig
 
 # Not imported here: whether it listens beyond this machine is decided when it is.

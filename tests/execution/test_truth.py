@@ -16,17 +16,15 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
-from generator.cli import app
-from generator.dataset.anchors_table import read_anchors
-from generator.dataset.heads_table import read_heads
-from generator.dataset.manifest import read_manifest, write_manifest
-from generator.dataset.open import as_array
-from generator.dataset.verify import verify_dataset
+from generator.cli.app import app
+from generator.dataset.format.anchors_table import read_anchors
+from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.manifest import read_manifest, write_manifest
+from generator.dataset.format.open import as_array
+from generator.dataset.proof.verify import verify_dataset
 from generator.errors import HeadError, UsageError
-from generator.execution.anchoring import level_head
-from generator.execution.build import build
-from generator.execution.open_executor import open_executor
-from generator.execution.prepare import Prepared
+from generator.execution.build.run import build
+from generator.execution.executors.open import open_executor
 from generator.execution.replay import replay_sample
 from generator.geometry.rigid import fit_rotations
 from generator.geometry.rotation import (
@@ -37,6 +35,8 @@ from generator.geometry.rotation import (
 )
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
+from generator.placing.anchoring import level_head
+from generator.placing.face import Prepared
 from generator.plan.config import load_config
 
 POSES = {"yaw": [-40, 40, 40], "pitch": [-20, 20, 40], "roll": [0, 20, 20]}
@@ -133,7 +133,7 @@ def test_wrong_passes_and_visibility_are_found(truth: Path, tmp_path: Path, what
         shutil.copy(sorted((root / "exr").rglob("*.exr"))[1], first)
         expected = f"{relative}: the passes are not those that were rendered (SHA-256 differs)"
     else:
-        from generator.dataset.part import check_part, read_part
+        from generator.dataset.format.part import check_part, read_part
 
         manifest = read_manifest(root)
         path = root / manifest.parts[0].path
@@ -238,7 +238,7 @@ def test_replay_gives_the_same_bytes(truth: Path, tmp_path: Path) -> None:
 
 
 def test_replay_says_what_differs(truth: Path, tmp_path: Path) -> None:
-    from generator.dataset.part import check_part, read_part
+    from generator.dataset.format.part import check_part, read_part
 
     root = Path(shutil.copytree(truth, tmp_path / "d"))
     manifest = read_manifest(root)

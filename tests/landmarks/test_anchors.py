@@ -22,9 +22,9 @@ from generator.geometry.rotation import (
 )
 from generator.heads.mesh import HeadMesh, Material
 from generator.landmarks.anchors import Anchors, View, find_anchors, no_anchors, pack, unpack
-from generator.landmarks.levelling import SHAPE_SD_DEG, level
 from generator.landmarks.reference_face import mirror_pairs, surface_face
 from generator.landmarks.surface import TOLERANCE_MM, Surface
+from generator.placing.levelling import SHAPE_SD_DEG, level
 
 RADII = np.array([70.0, 100.0, 80.0])
 SIDE = 454

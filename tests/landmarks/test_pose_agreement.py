@@ -11,8 +11,7 @@ import pytest
 from placed_head import PlacedHead
 from scipy.spatial.transform import Rotation
 
-from generator.execution.prepare import prepare
-from generator.execution.renderer import Renderer
+from generator.execution.lanes.renderer import Renderer
 from generator.geometry.camera import framing_distance
 from generator.geometry.rotation import geodesic_deg, rotation_from_angles
 from generator.heads.mesh import HeadMesh
@@ -21,6 +20,7 @@ from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.landmarks.reference_face import fit_pose, reference_face
+from generator.placing.face import prepare
 from generator.plan.render_settings import RenderSettings
 
 POSES = np.array(

@@ -9,11 +9,11 @@ from typing import Any
 
 import pyarrow as pa
 
-from generator.dataset.card import CARD_FILE, COLUMNS
 from generator.dataset.export.huggingface import card
 from generator.dataset.export.source import Source
 from generator.dataset.export.tables import exported_schema, write_tables
-from generator.dataset.schema import IMAGE_FIELD
+from generator.dataset.format.schema import IMAGE_FIELD
+from generator.dataset.show.card import CARD_FILE, COLUMNS
 
 CROISSANT_FILE = "croissant.json"
 FILES, ROWS = "parts", "rows"

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from generator.dataset.card import CARD_FILE, COLUMNS, markdown_table
 from generator.dataset.export.readme import conventions, facts, licences
 from generator.dataset.export.source import Source
 from generator.dataset.export.tables import dtype_name, exported_schema, write_tables
-from generator.dataset.heads_table import HEADS_FILE
-from generator.dataset.schema import IMAGE_FIELD
+from generator.dataset.format.heads_table import HEADS_FILE
+from generator.dataset.format.schema import IMAGE_FIELD
+from generator.dataset.show.card import CARD_FILE, COLUMNS, markdown_table
 
 _HUB_LICENCES = {
     "CC0-1.0": "cc0-1.0",

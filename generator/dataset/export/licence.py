@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow.compute as pc
 
 from generator.dataset.export.options import OVERRIDE, ExportOptions
-from generator.dataset.heads_table import HeadRow
-from generator.dataset.manifest import Manifest
-from generator.dataset.open import read_rows
+from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.open import read_rows
 from generator.errors import UsageError
 
 NAMED = 5

@@ -7,7 +7,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from generator.dataset.heads_table import HeadRow
+from generator.dataset.format.heads_table import HeadRow
 
 IDENTITIES_FILE = "identities.csv"
 

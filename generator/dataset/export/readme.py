@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from generator.dataset.card import licences_text, markdown_table
 from generator.dataset.export.options import OVERRIDE
 from generator.dataset.export.source import Source
-from generator.dataset.schema import CONVENTIONS
+from generator.dataset.format.schema import CONVENTIONS
+from generator.dataset.show.card import licences_text, markdown_table
 
 _MISSING = {
     "keep": "kept: their labels are exact all the same",

@@ -7,16 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from generator.dataset.card import CARD_FILE
 from generator.dataset.export import biwi, coco, croissant, huggingface, nlml_hpe, sixdrepnet, w300_lp
 from generator.dataset.export.licence import check_licences
 from generator.dataset.export.options import ExportOptions, Missing
 from generator.dataset.export.readme import readme
 from generator.dataset.export.source import Source
 from generator.dataset.export.target import new_folder
-from generator.dataset.heads_table import HeadRow, read_heads
-from generator.dataset.manifest import read_manifest
-from generator.dataset.schema import LANDMARKS
+from generator.dataset.format.heads_table import HeadRow, read_heads
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.format.schema import LANDMARKS
+from generator.dataset.show.card import CARD_FILE
 from generator.errors import UsageError
 
 Exporter = Callable[[Source, Path], str]

@@ -14,10 +14,10 @@ import pyarrow.compute as pc
 from generator.dataset.export.ibug68 import IBUG_68
 from generator.dataset.export.options import ExportOptions, Missing
 from generator.dataset.export.sample import Sample, exact_pixels, suffix_of
-from generator.dataset.heads_table import HeadRow
-from generator.dataset.manifest import Manifest
-from generator.dataset.open import as_array, image_bytes, read_rows
-from generator.dataset.part import PartInfo
+from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.open import as_array, image_bytes, read_rows
+from generator.dataset.format.part import PartInfo
 from generator.errors import DatasetError, UsageError
 from generator.plan.poses import ANGLES
 

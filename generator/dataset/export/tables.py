@@ -13,10 +13,10 @@ import pyarrow as pa
 
 from generator.dataset.export.sample import suffix_of
 from generator.dataset.export.source import Source
-from generator.dataset.heads_table import write_heads
-from generator.dataset.open import image_bytes
-from generator.dataset.part import part_schema_of, write_table
-from generator.dataset.schema import IMAGE_FIELD
+from generator.dataset.format.heads_table import write_heads
+from generator.dataset.format.open import image_bytes
+from generator.dataset.format.part import part_schema_of, write_table
+from generator.dataset.format.schema import IMAGE_FIELD
 
 LOCAL_ONLY = ("image_path", "passes_path", "passes_sha256")
 """Columns that point at files which do not travel with the table."""

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``headturn replay``: is one sample still what it was?"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from generator.cli.console import JsonFlag
+
+
+def replay(
+    folder: Annotated[Path, typer.Argument(help="A dataset made by headturn build.")],
+    sample_id: Annotated[str, typer.Argument(help="Its row, such as p0003/neutral/y+30_p-10_r+0.")],
+    heads: Annotated[Path | None, typer.Option(help="Where the head source lies now, if it moved.")] = None,
+    picture: Annotated[Path | None, typer.Option("--out", help="Write the new image there.")] = None,
+    blender: Annotated[
+        str | None, typer.Option("--blender", help="A Blender executable instead of the bpy wheel.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Render one sample again from its head and configuration, and compare every value.
+
+    Exit code 1 if anything differs.
+    """
+    from generator.execution.replay import replay_sample
+
+    found = replay_sample(folder, sample_id, heads=heads, picture=picture, blender=blender)
+    typer.echo(json.dumps(asdict(found), indent=1) if as_json else found.text())
+    if not found.same:
+        raise typer.Exit(1)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog="Example: headturn replay dataset p0003/neutral/y+30_p-10_r+0")(replay)

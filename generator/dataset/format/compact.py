@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Many small parts to a few large ones: a new dataset with the same rows and the same digest."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+import pyarrow as pa
+
+from generator.dataset.format.digest import add_digests
+from generator.dataset.format.files import write_atomically
+from generator.dataset.format.manifest import Manifest, read_manifest, write_manifest
+from generator.dataset.format.part import (
+    BATCH,
+    ROW_GROUP,
+    PartInfo,
+    check_part,
+    iter_part,
+    part_schema_of,
+    part_writer,
+)
+from generator.errors import DatasetError
+
+TARGET_BYTES = 256 * 10**6
+
+_MERGED = ("data", "manifest.json", "config.toml", "receipts.jsonl", "prepared.jsonl", "build.log")
+"""What of a dataset's folder is written anew, or belongs to its build: the new one cannot be built on."""
+
+
+class Progress(Protocol):
+    """Where the work says how far it is."""
+
+    def stage(self, name: str, total: int) -> None: ...
+
+    def advance(self, steps: int = 1) -> None: ...
+
+
+def compact_dataset(
+    source: Path, target: Path, part_bytes: int = TARGET_BYTES, *, reporter: Progress
+) -> Manifest:
+    """Write the dataset source again into the new folder target, in parts of about part_bytes.
+
+    Images and tables are linked where both folders are on one disk, else copied.
+    The new folder appears only when it is complete. Returns its manifest.
+
+    Raises
+    ------
+    DatasetError: source is not finished or damaged, target exists, or it cannot be written.
+    """
+    source, target = source.absolute(), target.absolute()
+    manifest = read_manifest(source)
+    if target.exists():
+        raise DatasetError(f"{target} exists; choose another --out")
+    if source in target.parents:
+        raise DatasetError(f"{target} lies inside of {source}; choose another --out")
+    work = target.with_name(f".{target.name}.tmp")
+    shutil.rmtree(work, ignore_errors=True)
+    try:
+        work.mkdir(parents=True)
+        parts = []
+        reporter.stage("compacting", len(manifest.parts))
+        for number, group in enumerate(_groups(manifest, part_bytes)):
+            parts.append(_merge(source, work, group, number))
+            reporter.advance(len(group))
+        for path in sorted(source.iterdir()):
+            if path.name not in _MERGED and not path.name.startswith("."):
+                _link(path, work / path.name)
+        compacted = replace(manifest, parts=tuple(parts))
+        if compacted.digest != manifest.digest:
+            raise DatasetError(f"{source}: its parts differ from its manifest; see `headturn verify`")
+        write_manifest(compacted, work)
+        work.rename(target)
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror}); free some disk space or check the permissions"
+        raise DatasetError(f"{target}: {reason}") from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return read_manifest(target)
+
+
+def _groups(manifest: Manifest, part_bytes: int) -> Iterator[list[PartInfo]]:
+    """Parts of one split that make up one new part, in the order of head and place."""
+    for split in manifest.splits:
+        parts = [part for part in manifest.parts if part.path.split("/")[1] == split]
+        group: list[PartInfo] = []
+        size = 0
+        for part in sorted(parts, key=lambda part: (part.subject, part.expression, part.path)):
+            if group and size + part.bytes > part_bytes:
+                yield group
+                group, size = [], 0
+            group.append(part)
+            size += part.bytes
+        yield group
+
+
+def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> PartInfo:
+    split = group[0].path.split("/")[1]
+    name = hashlib.sha256("".join(part.digest for part in group).encode()).hexdigest()[:16]
+    path = work / "data" / split / f"part-{number:05d}-{name}.parquet"
+    schema = part_schema_of(source / group[0].path)
+
+    def write(file: BinaryIO) -> None:
+        with part_writer(file, schema) as writer:
+            for part in group:
+                for rows in _row_groups(iter_part(source / part.path)):
+                    writer.write_table(rows)
+
+    def check(temporary: Path) -> PartInfo:
+        info = check_part(temporary)
+        if info.digest != add_digests(part.digest for part in group):
+            raise DatasetError(f"{path}: what was read back differs from what was merged; check the disk")
+        return replace(info, path=f"data/{split}/{path.name}")
+
+    return write_atomically(path, write, check)
+
+
+def _row_groups(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.Table]:
+    """Batches in tables of at most ROW_GROUP rows."""
+    while group := list(islice(batches, ROW_GROUP // BATCH)):
+        yield pa.Table.from_batches(group)
+
+
+def _link(path: Path, target: Path) -> None:
+    """A second name for every file below path, or a copy where the disk has no such thing."""
+    if path.is_dir():
+        shutil.copytree(path, target, copy_function=_link_file)
+    else:
+        _link_file(str(path), str(target))
+
+
+def _link_file(path: str, target: str) -> None:
+    try:
+        os.link(path, target)
+    except OSError:
+        shutil.copy2(path, target)

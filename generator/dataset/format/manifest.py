@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""manifest.json: written last, so a dataset that has one is finished."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, get_type_hints
+
+from generator.dataset.format.anchors_table import ANCHORS_FILE
+from generator.dataset.format.digest import add_digests
+from generator.dataset.format.files import file_sha256, one_line, write_bytes
+from generator.dataset.format.heads_table import HEADS_FILE
+from generator.dataset.format.part import PartInfo
+from generator.dataset.format.schema import IMAGE_MODES, SCHEMA_VERSION, ImageMode, check_schema_version
+from generator.errors import DatasetError
+
+MANIFEST_FILE = "manifest.json"
+POSES_FILE = "poses.csv"
+_PART_PATH = re.compile(r"data/[\w+-][\w .+-]*/part-[\w .+-]+\.parquet")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a finished dataset consists of.
+
+    versions: name and version of every package that decided the content, with "headturn".
+    configuration: everything that decides the content, as plain JSON values.
+    parts: sorted by path. images: see :data:`generator.dataset.format.schema.ImageMode`.
+    heads, skipped, failures: how many heads it has, which were left out and
+        why, and how many units failed and are recorded in failures.jsonl.
+    created_by: the command line, for people; the only field that may differ
+        between two builds of the same configuration.
+    tables: SHA-256 of heads.parquet, anchors.parquet and poses.csv; :func:`write_manifest` fills it in.
+    """
+
+    versions: dict[str, str]
+    configuration: dict[str, Any]
+    parts: tuple[PartInfo, ...]
+    images: ImageMode
+    heads: int
+    skipped: tuple[dict[str, str], ...] = ()
+    failures: int = 0
+    created_by: str = ""
+    tables: dict[str, str] = field(default_factory=dict)
+    schema_version: str = SCHEMA_VERSION
+
+    @property
+    def rows(self) -> int:
+        """Rows of all parts."""
+        return sum(part.rows for part in self.parts)
+
+    @property
+    def detected_rows(self) -> int:
+        """Rows with a face found."""
+        return sum(part.detected for part in self.parts)
+
+    @property
+    def digest(self) -> str:
+        """Digest of the dataset's content, see :mod:`generator.dataset.format.digest`."""
+        return add_digests(part.digest for part in self.parts)
+
+    @property
+    def splits(self) -> list[str]:
+        """Names of the splits that have parts."""
+        return sorted({part.path.split("/")[1] for part in self.parts})
+
+    def as_dict(self) -> dict[str, Any]:
+        """The values of manifest.json, in its order."""
+        return {
+            "schema_version": self.schema_version,
+            "digest": self.digest,
+            "rows": self.rows,
+            "detected_rows": self.detected_rows,
+            "heads": self.heads,
+            "skipped": list(self.skipped),
+            "failures": self.failures,
+            "images": {"mode": self.images, "count": 0 if self.images == "none" else self.rows},
+            "versions": dict(sorted(self.versions.items())),
+            "configuration_digest": configuration_digest(self.configuration),
+            "configuration": self.configuration,
+            "tables": self.tables,
+            "parts": [asdict(part) for part in sorted(self.parts, key=lambda part: part.path)],
+            "created_by": self.created_by,
+        }
+
+
+def configuration_digest(configuration: Mapping[str, Any]) -> str:
+    """SHA-256, hex, of a configuration as JSON with sorted keys."""
+    text = json.dumps(
+        configuration, sort_keys=True, ensure_ascii=False, separators=(",", ":"), allow_nan=False
+    )
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def common_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """What all parts of a dataset share: its configuration without heads and poses, which may grow."""
+    return {name: section for name, section in configuration.items() if name not in ("heads", "poses")}
+
+
+def portable_command(arguments: Sequence[str]) -> str:
+    """A command line without the folders of the machine it ran on: "/home/x/a.toml" becomes "a.toml"."""
+    return " ".join(_without_folder(argument) for argument in arguments)
+
+
+def write_manifest(manifest: Manifest, root: Path) -> None:
+    """Write manifest.json atomically, as the last file of a dataset.
+
+    Raises DatasetError: heads.parquet, anchors.parquet or poses.csv is not there, or it cannot write.
+    """
+    try:
+        tables = {name: file_sha256(root / name) for name in (HEADS_FILE, ANCHORS_FILE, POSES_FILE)}
+    except OSError as error:
+        raise DatasetError(
+            f"{error.filename}: cannot be read ({error.strerror}); write it before the manifest"
+        ) from error
+    manifest = replace(manifest, tables=tables)
+    text = json.dumps(manifest.as_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_bytes(root / MANIFEST_FILE, text.encode())
+
+
+def read_manifest(root: Path) -> Manifest:
+    """The manifest of a finished dataset.
+
+    Raises DatasetError: there is none, it is not one, it is of another version,
+    or it contradicts itself.
+    """
+    path = root / MANIFEST_FILE
+    if not root.is_dir():
+        raise DatasetError(f"{root}: no such folder; give the folder that `headturn build --out` wrote")
+    if not path.is_file():
+        raise DatasetError(
+            f"{root}: not a Headturn dataset, or its build did not finish (no {MANIFEST_FILE}); "
+            "run `headturn build` again"
+        )
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        check_schema_version(values["schema_version"], str(path))
+        manifest = _parse(values)
+        changed = [key for key, value in manifest.as_dict().items() if values[key] != value]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DatasetError(
+            f"{path}: not a manifest of Headturn ({type(error).__name__}: {one_line(error)}); "
+            "run `headturn build` again"
+        ) from error
+    if changed:
+        raise DatasetError(
+            f"{path}: {', '.join(changed)} contradicts the rest: the file was changed after the build; "
+            "run `headturn build` again"
+        )
+    return manifest
+
+
+def _parse(values: dict[str, Any]) -> Manifest:
+    kinds = get_type_hints(PartInfo)
+    for part in values["parts"]:
+        if any(type(part[name]) is not kind for name, kind in kinds.items()):
+            raise ValueError(f"a part is described by {part}")
+        if not _PART_PATH.fullmatch(part["path"]):
+            raise ValueError(f"{part['path']!r} is not where a part can be")
+    if values["images"]["mode"] not in IMAGE_MODES:
+        raise ValueError(f"images: {values['images']['mode']!r} is none of {', '.join(IMAGE_MODES)}")
+    return Manifest(
+        versions=values["versions"],
+        configuration=values["configuration"],
+        parts=tuple(PartInfo(**part) for part in values["parts"]),
+        images=values["images"]["mode"],
+        heads=values["heads"],
+        skipped=tuple(values["skipped"]),
+        failures=values["failures"],
+        created_by=values["created_by"],
+        tables=values["tables"],
+        schema_version=values["schema_version"],
+    )
+
+
+def _without_folder(argument: str) -> str:
+    option, equals, value = argument.rpartition("=")
+    for kind in (PurePosixPath, PureWindowsPath):
+        if kind(value).is_absolute():
+            value = kind(value).name
+    return option + equals + value

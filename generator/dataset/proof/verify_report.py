@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a verification proved, refuted and counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from generator.dataset.show.detection import Cell
+
+SHOWN = 3
+"""How many of the same problem are named; the rest are counted."""
+
+WORST = 5
+
+NOT_CHECKED = "not checked, because of the problems above"
+
+
+@dataclass
+class Check:
+    """One thing that was proved or refuted. problems holds the first few of count."""
+
+    name: str
+    problems: list[str] = field(default_factory=list)
+    count: int = 0
+    done: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """Was it checked, and is it so?"""
+        return self.done and not self.count
+
+    @property
+    def detail(self) -> str:
+        """One line: what is wrong, the first few named; "" if nothing is."""
+        if self.count:
+            more = f" and {self.count - len(self.problems)} more" if self.count > len(self.problems) else ""
+            return "; ".join(self.problems) + more
+        return "" if self.done else NOT_CHECKED
+
+    def add(self, problems: Iterable[str]) -> None:
+        """Count problems and keep the first few."""
+        for problem in problems:
+            self.count += 1
+            if len(self.problems) < SHOWN:
+                self.problems.append(problem)
+
+    def merge(self, other: Check) -> None:
+        """Count what another check of the same thing found after this one."""
+        self.problems += other.problems[: SHOWN - len(self.problems)]
+        self.count += other.count
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """What was checked and what was counted. Rates are shares of 1; NaN without rows.
+
+    closure_deg: the largest angle between R_C and the rigid fit of landmarks_exact.
+    quick: contents were not read; then closure_deg, rate_by_subject and cells are empty.
+    """
+
+    checks: tuple[Check, ...]
+    heads: int = 0
+    poses: int = 0
+    rows: int = 0
+    detected_rows: int = 0
+    detection_rate: float = float("nan")
+    closure_deg: float = 0.0
+    rate_by_subject: dict[str, float] = field(default_factory=dict)
+    cells: tuple[Cell, ...] = ()
+    quick: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """Did every check pass?"""
+        return all(check.ok for check in self.checks)
+
+    @property
+    def worst_cells(self) -> list[Cell]:
+        """The cells of yaw x pitch with the lowest detection rate, worst first."""
+        return sorted(self.cells, key=lambda cell: cell.rate)[:WORST]
+
+    def text(self) -> str:
+        """The report for people, a line a fact."""
+        unchecked = [check.name for check in self.checks if check.detail == NOT_CHECKED]
+        lines = [
+            f"{'ok  ' if check.ok else 'FAIL'}  {check.name}{': ' * bool(check.detail)}{check.detail}"
+            for check in self.checks
+            if check.detail != NOT_CHECKED
+        ]
+        if unchecked:
+            lines.append(f"{NOT_CHECKED}: {', '.join(unchecked)}")
+        if self.rows:
+            lines.append(
+                f"{self.rows} rows of {self.heads} heads x {self.poses} poses; "
+                f"a face was found in {self.detection_rate:.1%}"
+            )
+        if self.quick:
+            lines.append("quick: sizes and footers only; without --quick every byte is read")
+        elif self.rows:
+            lines.append(f"exact landmarks give R_C back to {self.closure_deg:.1g}°")
+            lines += [
+                f"  yaw {cell.yaw_deg:+g}, pitch {cell.pitch_deg:+g}: {cell.rate:.0%} of {cell.rows}"
+                for cell in self.worst_cells
+                if cell.rate < 1
+            ]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "ok": self.ok,
+            "quick": self.quick,
+            "checks": [{"name": c.name, "ok": c.ok, "detail": c.detail} for c in self.checks],
+            "heads": self.heads,
+            "poses": self.poses,
+            "rows": self.rows,
+            "detected_rows": self.detected_rows,
+            "detection_rate": self.detection_rate if self.rows else None,
+            "closure_deg": self.closure_deg,
+            "rate_by_subject": self.rate_by_subject,
+            "cells": [{**asdict(cell), "rate": cell.rate} for cell in self.cells],
+        }

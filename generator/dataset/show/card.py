@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""README.md of a dataset: what is in it, under which licences, how to read it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from generator.dataset.format.files import write_bytes
+from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
+from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.schema import CONVENTIONS
+
+CARD_FILE = "README.md"
+
+COLUMNS = (
+    ("sample_id, subject, expression, split", "identity; sample_id is subject/expression/pose"),
+    ("head_license, redistributable", "licence of the head; may its images be published?"),
+    ("yaw_deg, pitch_deg, roll_deg", "the pose, degrees, exact"),
+    ("yaw_index, pitch_index, roll_index", "place in the grid, -1 off the grid"),
+    ("rotation", "R_C, 9 numbers, row-major"),
+    ("quaternion", "w, x, y, z of R_C"),
+    ("camera, translation_mm", "K, 9 numbers, row-major, pixels; the head's pivot in the camera frame"),
+    ("detected", "was the face found?"),
+    ("landmarks", "1404 numbers: 468 x (x, y, z), isotropic pixels; NaN where not detected"),
+    ("projection", "perspective or orthographic"),
+    ("landmarks_exact", "1404 numbers: the same points on the mesh, frame C, mm; NaN without an anchor"),
+    ("landmarks_visible", "468 flags: does the camera see the exact landmark?"),
+    ("width, height, image_path, image_sha256", "the image; its path is relative to this folder"),
+    ("passes_path, passes_sha256", "OpenEXR passes and the hash of their floats; empty without"),
+)
+
+_READING = """\
+```python
+import pandas as pd
+rows = pd.read_parquet("DIR/data")                       # all splits; DIR/data/train for one
+
+import polars as pl
+rows = pl.read_parquet("DIR/data/**/*.parquet")
+
+import duckdb
+rows = duckdb.sql("SELECT * FROM 'DIR/data/**/*.parquet'")
+
+from datasets import load_dataset
+rows = load_dataset("DIR")                               # heads: load_dataset("DIR", "heads")
+```
+
+Landmarks as an array: `np.stack(rows["landmarks"]).reshape(-1, 468, 3)`.
+"""
+
+
+def write_card(manifest: Manifest, root: Path) -> None:
+    """Write README.md with the front matter that `load_dataset` reads; heads.parquet must be there.
+
+    Raises DatasetError if it cannot.
+    """
+    write_bytes(root / CARD_FILE, dataset_card(manifest, read_heads(root)).encode())
+
+
+def dataset_card(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
+    """The text of README.md."""
+    rate = f"{manifest.detected_rows / manifest.rows:.1%}" if manifest.rows else "none"
+    images = {
+        "none": "not stored; image_sha256 is the hash of the image that was rendered",
+        "files": "files under images/, see image_path",
+        "embedded": "in the column image (bytes, path)",
+    }[manifest.images]
+    summary = (
+        f"{manifest.heads} heads, {manifest.rows} images, faces found in {rate} of them. "
+        f"Made with Headturn {manifest.versions['headturn']}; content digest `{manifest.digest}`."
+    )
+    other_tables = (
+        "`heads.parquet` has a row a head: source, licence, file hashes, pivot, scale, camera, known "
+        "problems. `poses.csv` lists the poses; every head has each of them once."
+    )
+    sections = [
+        _front_matter(manifest, heads),
+        "# Head poses",
+        summary,
+        f"Images: {images}.",
+        "## Licences\n\n" + licences_text(heads),
+        "## Reading\n\n" + _READING.rstrip(),
+        "## Columns of data/\n\n" + markdown_table(("column", "meaning"), COLUMNS),
+        other_tables,
+        "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(CONVENTIONS.items())),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def _front_matter(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
+    licenses = {head.license for head in heads}
+    lines = [
+        "---",
+        f"license: {'cc0-1.0' if licenses == {'CC0-1.0'} else 'other'}",
+        "tags: [head-pose-estimation, face-landmarks, synthetic]",
+        "configs:",
+        "- config_name: default",
+        "  default: true",
+        "  data_files:",
+    ]
+    for split in manifest.splits:
+        lines += [f"  - split: {json.dumps(split)}", f"    path: {json.dumps(f'data/{split}/*.parquet')}"]
+    lines += ["- config_name: heads", f"  data_files: {HEADS_FILE}", "---"]
+    return "\n".join(lines)
+
+
+def licences_text(heads: Sequence[HeadRow]) -> str:
+    """Sources and licences of heads as a table in Markdown, and a warning where some may not be published."""
+    counts = Counter((head.source, head.license, head.redistributable, head.attribution) for head in heads)
+    rows = [
+        (source, str(count), license_, "yes" if redistributable else "**no**", attribution)
+        for (source, license_, redistributable, attribution), count in sorted(counts.items())
+    ]
+    text = markdown_table(("source", "heads", "licence", "images may be published", "attribution"), rows)
+    if not all(head.redistributable for head in heads):
+        text += (
+            "\n\n**Do not publish this dataset as it is**: rows with `redistributable = false` "
+            "show heads whose licence forbids it."
+        )
+    return text
+
+
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.replace("|", "\\|").split())

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""report.html: everything in one file that needs no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from generator.dataset.format.files import write_bytes
+from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.manifest import POSES_FILE, read_manifest
+from generator.dataset.show.report.atlas import collect_atlas
+from generator.dataset.show.report.cells import PoseCells
+from generator.dataset.show.report.facts import build_facts, head_facts, why_no_atlas
+from generator.dataset.show.report.tiles import contact_sheet, thumbnails
+from generator.plan.poses import csv_plan
+
+
+def write_report(root: Path, page: Path, progress: Callable[[int], None] | None = None) -> int:
+    """Write the page; returns its size in bytes.
+
+    progress: called with the number of rows read.
+
+    Raises
+    ------
+    DatasetError: the dataset is not finished, of another version, or damaged;
+        or the page cannot be written.
+    """
+    text = page_text(report_data(Path(root), progress or (lambda _: None)))
+    write_bytes(Path(page), text.encode())
+    return len(text.encode())
+
+
+def report_data(root: Path, progress: Callable[[int], None]) -> dict[str, Any]:
+    """What the page shows, as plain values. Raises DatasetError as :func:`write_report` does."""
+    manifest, heads = read_manifest(root), read_heads(root)
+    plan = csv_plan(root / POSES_FILE)
+    cells = PoseCells.of(plan)
+    atlas = collect_atlas(root, manifest, heads, cells, progress)
+    return {
+        "rows": manifest.rows,
+        "detected": manifest.detected_rows,
+        "heads_count": manifest.heads,
+        "publishable": sum(head.redistributable for head in heads),
+        "poses": len(plan),
+        "images": manifest.images,
+        "overall": atlas.overall,
+        "why_no_atlas": why_no_atlas(heads, atlas),
+        **atlas.as_dict(),
+        "sheet": contact_sheet(root, manifest, heads, plan),
+        "heads": head_facts(heads, thumbnails(root, manifest, heads, plan), atlas),
+        "build": build_facts(root, manifest),
+    }
+
+
+def page_text(data: dict[str, Any]) -> str:
+    """The page with its style, its script and its data inside."""
+    folder = files("generator.dataset.show.report")
+    template, style, script = (
+        folder.joinpath(name).read_text(encoding="utf-8") for name in ("page.html", "page.css", "page.js")
+    )
+    values = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    # Names of heads come from file names: "</script>" in one must not end the element.
+    values = values.replace("<", "\\u003c")
+    for mark, content in (("/*STYLE*/", style), ("/*SCRIPT*/", script), ("/*DATA*/", values)):
+        head, _, tail = template.partition(mark)
+        template = head + content + tail
+    return template

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a planned head becomes in heads.parquet and anchors.parquet."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from generator.dataset.format.anchors_table import HeadAnchors
+from generator.dataset.format.heads_table import HeadRow
+from generator.execution.build.units import PlannedHead
+from generator.geometry.rotation import graphics_rotation
+from generator.plan.config import BuildConfig
+
+
+def head_row(planned: PlannedHead, mesh_path: str, config: BuildConfig) -> HeadRow:
+    """The row of heads.parquet. mesh_path: relative to the root of its source."""
+    head, prepared, anchors = planned.head, planned.prepared, planned.anchors
+    return HeadRow(
+        subject=head.subject,
+        expression=head.expression,
+        source=head.source,
+        mesh_path=mesh_path,
+        file_sha256=planned.file_sha256,
+        license=head.license,
+        redistributable=head.redistributable,
+        attribution=head.attribution,
+        units=prepared.units,
+        mm_per_unit=prepared.mm_per_unit,
+        up=prepared.up,
+        forward=prepared.forward,
+        pivot=prepared.pivot,
+        radius_mm=prepared.radius_mm,
+        distance_mm=planned.distance_mm,
+        lens_mm=config.render.lens_mm,
+        projection=config.render.projection,
+        frame=prepared.frame,
+        correction=prepared.correction,
+        correction_sd_deg=prepared.correction_sd_deg,
+        anchor_views=anchors.views,
+        anchor_off=anchors.off,
+        anchor_absent=anchors.absent,
+        anchor_residual_px=anchors.residual_px,
+        anchor_residual_mm=anchors.residual_mm,
+        anchor_asymmetry_mm=round(anchors.asymmetry_mm, 6),
+        vertices=planned.vertices,
+        triangles=planned.triangles,
+        split=planned.split,
+        problems=(*head.problems, *planned.problems, *prepared.notes),
+    )
+
+
+def head_anchors(planned: PlannedHead) -> HeadAnchors:
+    """The row of anchors.parquet: points at the pose zero of the dataset."""
+    return HeadAnchors(
+        subject=planned.head.subject,
+        expression=planned.head.expression,
+        triangles=planned.anchors.triangles,
+        weights=planned.anchors.weights,
+        points=planned.anchors.turned(graphics_rotation(planned.prepared.levelling)),
+    )
+
+
+def relative(path: Path, root: Path) -> str:
+    """path relative to the root of its source, with "/"."""
+    return Path(os.path.relpath(path, root if root.is_dir() else root.parent)).as_posix()

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What preparing heads found, kept in the dataset's folder: a resumed build does not look again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from generator.dataset.format.files import append_line
+from generator.errors import WorkerError
+from generator.execution.executors.executor import Executor
+from generator.execution.lanes.slot import Outcome
+
+PREPARED_FILE = "prepared.jsonl"
+
+
+def lane_versions(executor: Executor) -> dict[str, str]:
+    """Name and version of everything in a lane that decides content.
+
+    Raises WorkerError if no lane can be started.
+    """
+    [outcome] = executor.run([{"op": "versions"}], lambda: None)
+    if outcome.receipt is None:
+        raise WorkerError(f"no render worker can be started: {outcome.error}", outcome.log)
+    return outcome.receipt["versions"]
+
+
+class PreparedHeads:
+    """Receipts of prepare orders, one JSON line each, known by what they depend on.
+
+    versions: of :func:`lane_versions`. file_sha256: of every file of every head, by its path.
+    """
+
+    def __init__(self, root: Path, versions: dict[str, str], file_sha256: dict[str, str]) -> None:
+        self._path = root / PREPARED_FILE
+        self._versions, self._file_sha256 = versions, file_sha256
+        self._known = _read(self._path)
+
+    def outcomes(self, orders: Sequence[dict[str, Any]], executor: Executor) -> Iterator[Outcome]:
+        """The outcome of each order: known from before, or carried out now and kept.
+
+        Raises DatasetError if it cannot be written.
+        """
+        unknown = []
+        for order in orders:
+            receipt = self._known.get(self._key(order))
+            if receipt is None:
+                unknown.append(order)
+            else:
+                yield Outcome(order, receipt)
+        for outcome in executor.run(unknown, lambda: None):
+            if outcome.receipt is not None:
+                line = {"key": self._key(outcome.order), "receipt": outcome.receipt}
+                append_line(self._path, json.dumps(line))
+            yield outcome
+
+    def _key(self, order: dict[str, Any]) -> str:
+        hashes = [[self._file_sha256[file] for file in head["files"]] for head in order["heads"]]
+        text = json.dumps([order, hashes, self._versions], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _read(path: Path) -> dict[str, dict[str, Any]]:
+    known = {}
+    if path.exists():
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:
+                record = json.loads(line)
+                known[record["key"]] = record["receipt"]
+            except (ValueError, KeyError, TypeError):
+                continue  # cut short by a crash: that head is looked at again
+    return known

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything that comes in kinds, each kind in one list. What belongs into an entry: docs/architecture.md."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from generator.registry import Registry
+
+FORMATS: Registry[Any] = Registry(
+    "--format",
+    {
+        "nlml-hpe": "generator.dataset.export.nlml_hpe:FORMAT",
+        "300w-lp": "generator.dataset.export.w300_lp:FORMAT",
+        "6drepnet": "generator.dataset.export.sixdrepnet:FORMAT",
+        "biwi": "generator.dataset.export.biwi:FORMAT",
+        "huggingface": "generator.dataset.export.huggingface:FORMAT",
+        "croissant": "generator.dataset.export.croissant:FORMAT",
+        "coco": "generator.dataset.export.coco:FORMAT",
+    },
+)
+"""``headturn export --format``: a :class:`generator.dataset.export.options.Format`."""
+
+DETECTORS: Registry[Any] = Registry(
+    "landmarks.detector", {"mediapipe": "generator.landmarks.mediapipe_mesh:MediaPipeFaceMesh"}
+)
+"""A class whose instances are a :class:`generator.landmarks.detector.Detector`; made from min_confidence."""
+
+TOPOLOGIES: Registry[Any] = Registry(
+    "landmark topology", {"mediapipe-face-mesh-468": "generator.landmarks.topology:FACE_MESH"}
+)
+"""A :class:`generator.landmarks.topology.Topology`."""
+
+PASSES: Registry[Any] = Registry(
+    "--passes",
+    {
+        name: f"generator.plan.passes:{name.upper()}"
+        for name in ("depth", "normal", "position", "uv", "object_index")
+    },
+)
+"""``--passes``: a :class:`generator.plan.passes.Pass`."""
