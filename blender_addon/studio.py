@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
+from generator.blender.scene import METRES, fill_scene, turn
+from generator.plan.render_settings import RenderSettings
 
 from generator.blender.materials import srgb_to_linear
-from generator.blender.scene import METRES, fill_scene, turn
 from generator.geometry.camera import framing_distance
 from generator.heads.package import load_package
-from generator.plan.render_settings import RenderSettings
 
 from . import landmarks, overlay, session, settings
 from .core.grid import snapped

@@ -39,3 +39,26 @@ PASSES: Registry[Any] = Registry(
     },
 )
 """``--passes``: a :class:`generator.plan.passes.Pass`."""
+
+EXECUTORS: Registry[Any] = Registry(
+    "--executor",
+    {
+        "serial": "generator.execution.executors.serial:SerialExecutor",
+        "local": "generator.execution.executors.local:LocalExecutor",
+        "ray": "generator.execution.executors.ray:RayExecutor",
+    },
+)
+"""``headturn build --executor``: makes a :class:`generator.execution.executors.executor.Executor` of its
+Circumstances."""
+
+HEAD_FINDERS: Registry[Any] = Registry(
+    "head source",
+    {
+        "facescape": "generator.heads.facescape:FINDER",
+        "mesh": "generator.heads.folders:FINDER",
+    },
+)
+"""Heads on disk: a :class:`generator.heads.head.Finder`. The first that finds something reads it."""
+
+HEAD_MAKERS: Registry[Any] = Registry("--heads", {"parametric": "generator.heads.parametric.make:MAKER"})
+"""Heads made on the spot, by ``--heads NAME`` or ``NAME:ARGUMENT``: a :class:`generator.heads.head.Maker`."""

@@ -15,7 +15,7 @@ from generator.heads.parametric.make import make_heads
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
-from generator.placing.face import prepare
+from generator.placing.face import find_face
 
 SHARED_HEADS = Path(__file__).resolve().parents[2] / "shared" / "heads"
 
@@ -70,5 +70,5 @@ def placed_head(
     scratch = tmp_path_factory.mktemp("placed")
     head = find_heads(parametric_heads).heads[0]
     mesh = read_mesh(head, scratch)
-    prepared = prepare(head, mesh, renderer, detector, scratch)
-    return PlacedHead(head, prepared, prepared.normalise(mesh))
+    placement = find_face(head, mesh, renderer, detector, scratch)
+    return PlacedHead(head, placement, placement.normalise(mesh))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
-from generator.placing.face import Prepared
+from generator.heads.placement import Placement
 
 
 @dataclass(frozen=True)
@@ -15,5 +15,5 @@ class PlacedHead:
     """A head with its face found: mesh in frame U, mm, pivot at the origin."""
 
     head: Head
-    prepared: Prepared
+    placement: Placement
     mesh: HeadMesh

@@ -32,24 +32,23 @@ class Outline:
     vertices: float [V, 3], frame U, mm, pivot at the origin.
     """
 
-    def __init__(self, vertices: np.ndarray, camera: Camera) -> None:
+    def __init__(self, vertices: np.ndarray) -> None:
         points = vertices if len(vertices) <= EXACT else _cell_corners(vertices)
         self._points = points @ CAMERA_FROM_GRAPHICS
-        self._camera = camera
 
-    def box(self, ypr_deg: Sequence[float]) -> Box | None:
+    def box(self, ypr_deg: Sequence[float], camera: Camera) -> Box | None:
         """The pixels the head can touch at a pose, None if there are none."""
         rotation = rotation_from_angles(np.asarray(ypr_deg, dtype=np.float64))
-        points = self._points @ rotation.T + self._camera.translation_mm
-        size = self._camera.resolution
-        if points[:, 2].min() < 0.05 * self._camera.distance_mm:
-            return 0, size, 0, size  # part of it is beside the camera: there is no outline
-        pixels = self._camera.project(points)
+        points = self._points @ rotation.T + camera.translation_mm
+        size = (camera.width, camera.height)
+        if points[:, 2].min() < 0.05 * camera.distance_mm:
+            return 0, size[0], 0, size[1]  # part of it is beside the camera: there is no outline
+        pixels = camera.project(points)
         low = np.clip(np.floor(pixels.min(axis=0)) - MARGIN, 0, size).astype(int).tolist()
         high = np.clip(np.ceil(pixels.max(axis=0)) + MARGIN, 0, size).astype(int).tolist()
         if low[0] >= high[0] or low[1] >= high[1]:
             return None
-        return low[0], high[0], size - high[1], size - low[1]
+        return low[0], high[0], size[1] - high[1], size[1] - low[1]
 
 
 class Backdrop:

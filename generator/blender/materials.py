@@ -7,17 +7,16 @@ from pathlib import Path
 
 import bpy
 
-from generator.blender.light import key_direction
 from generator.heads.mesh import Material
-from generator.plan.render_settings import RenderSettings
 
 VERTEX_COLORS = "Color"
 UV_MAP = "UVMap"
 
+DIRECTION, STRENGTH = "direction of the light", "strength of the light"
+"""Nodes of the fast preset's materials, which :mod:`generator.blender.light` sets."""
 
-def build_material(
-    material: Material, settings: RenderSettings, *, has_vertex_colors: bool
-) -> bpy.types.Material:
+
+def build_material(material: Material, preset: str, *, has_vertex_colors: bool) -> bpy.types.Material:
     """A Blender material with the head's colour and the preset's shading.
 
     Raises FileNotFoundError or RuntimeError if the texture cannot be read.
@@ -28,10 +27,10 @@ def build_material(
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     color, alpha = _base_color(tree, material, has_vertex_colors)
-    if settings.preset == "fast":
+    if preset == "fast":
         # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
         made.cycles.emission_sampling = "NONE"
-        surface = _lit_by_normal(tree, color, settings)
+        surface = _lit_by_normal(tree, color)
     else:
         surface = _principled(tree, color)
     if material.cutout and alpha is not None:
@@ -71,9 +70,7 @@ def _load_image(path: Path) -> bpy.types.Image:
     return image
 
 
-def _lit_by_normal(
-    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, settings: RenderSettings
-) -> bpy.types.NodeSocket:
+def _lit_by_normal(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Emission = colour x (ambient + (1 - ambient) x half-Lambert(normal . light)).
 
     Half-Lambert (Mitchell et al., "Illustrative rendering in Team Fortress 2",
@@ -82,12 +79,12 @@ def _lit_by_normal(
     """
     geometry = tree.nodes.new("ShaderNodeNewGeometry")
     dot = tree.nodes.new("ShaderNodeVectorMath")
-    dot.operation = "DOT_PRODUCT"
-    dot.inputs[1].default_value = key_direction(settings)
+    dot.operation, dot.name = "DOT_PRODUCT", DIRECTION
     tree.links.new(geometry.outputs["Normal"], dot.inputs[0])
     wrapped = _math(tree, "MULTIPLY_ADD", dot.outputs["Value"], 0.5, 0.5)
     squared = _math(tree, "MULTIPLY", wrapped, wrapped)
-    strength = _math(tree, "MULTIPLY_ADD", squared, 1.0 - settings.ambient, settings.ambient)
+    strength = _math(tree, "MULTIPLY_ADD", squared)
+    strength.node.name = STRENGTH
     emission = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(color, emission.inputs["Color"])
     tree.links.new(strength, emission.inputs["Strength"])

@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The render worker: a process with bpy that takes orders on stdin and answers with receipts.
 
-One JSON object a line in both directions. Orders:
+One JSON object a line in both directions: :class:`generator.messages.RenderOrder` is answered with
+Rendered after each view and OrderDone at the end, ConvertOrder with OrderDone. The head stays
+loaded until another is named.
 
-``{"op": "render", "package": FILE.npz, "settings": {...}, "distance_mm": D,
-"poses": [[yaw, pitch, roll], ...], "out": FOLDER, "format": "bmp" or "exr", "passes": [...]}``
-    renders each pose into ``FOLDER/<index>.<format>``, or with passes ("depth", "normal", ...) these
-    alone, as a multilayer .exr; answers ``{"frame": index, "path": ...}``
-    after each and ``{"done": count}`` at the end. The head stays loaded until another is named.
-``{"op": "convert", "source": FILE.fbx, "target": FILE.glb}``
-    reads a mesh with Blender's importer and writes it as glTF; answers ``{"done": 1}``.
-
-The first line a worker writes is ``{"ready": VERSION}``. An order that fails is
-answered with ``{"error": "one line"}`` and the worker goes on; it ends when
-stdin closes, so it never outlives the process that started it.
+The first thing a worker says is WorkerReady. An order that fails is answered with OrderFailed and
+the worker goes on; it ends when stdin closes, so it never outlives the process that started it.
 
 Start it with the bpy wheel (``python -m generator.blender.worker``) or inside a
 Blender (``blender --background --factory-startup --python worker.py``).
@@ -26,6 +19,7 @@ import json
 import os
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -56,47 +50,63 @@ if __name__ == "__main__":
 
 import bpy  # noqa: E402
 
-from generator.blender import compat, scene  # noqa: E402
+from generator.blender import compat  # noqa: E402
+from generator.blender.images import Images  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
-from generator.plan.render_settings import RenderSettings  # noqa: E402
+from generator.messages import (  # noqa: E402
+    ConvertOrder,
+    OrderDone,
+    OrderFailed,
+    Rendered,
+    RenderOrder,
+    WorkerReady,
+    from_json,
+    to_json,
+)
+
+Answer = Callable[[Any], None]
+"""Takes each message of the worker."""
 
 
 class RenderWorker:
-    """Keeps one head loaded and renders it at any pose."""
+    """Keeps one head loaded and renders any view of it."""
 
     def __init__(self, threads: int) -> None:
         self._threads = threads
-        self._loaded: tuple[Any, ...] | None = None
-        self._stage: scene.Stage | None = None
+        self._loaded: tuple[Path, int] | None = None
+        self._images: Images | None = None
 
-    def render(self, order: dict[str, Any], answer: Any) -> None:
-        """Carry out a render order; answer is called with each receipt."""
-        settings = RenderSettings.from_dict(order["settings"])
-        package = Path(order["package"])
-        wanted = (package, package.stat().st_mtime_ns, settings, order["distance_mm"])
+    def carry_out(self, order: Any, answer: Answer) -> None:
+        """Carry out an order. TypeError if it is none of a render worker's."""
+        if isinstance(order, RenderOrder):
+            self._render(order, answer)
+        elif isinstance(order, ConvertOrder):
+            self._convert(order)
+        else:
+            raise TypeError(f"{type(order).__name__} is no order for a render worker")
+        answer(OrderDone())
+
+    def _render(self, order: RenderOrder, answer: Answer) -> None:
+        package = Path(order.package)
+        wanted = (package, package.stat().st_mtime_ns)
         if wanted != self._loaded:
             self._loaded = None
-            mesh = load_package(package)
-            self._stage = scene.Stage(mesh, settings, order["distance_mm"], threads=self._threads)
+            self._images = Images(load_package(package), threads=self._threads)
             self._loaded = wanted
-        assert self._stage is not None
-        out = Path(order["out"])
-        for index, pose in enumerate(order["poses"]):
-            path = out / f"{index:06d}.{order['format']}"
-            if order.get("passes"):
-                self._stage.render_passes(pose, path, order["passes"])
+        assert self._images is not None
+        for place, view in enumerate(order.views):
+            path = Path(order.out) / f"{place:06d}.{order.format}"
+            if order.passes:
+                self._images.render_passes(view, path, order.passes)
             else:
-                self._stage.render(pose, path)
-            answer({"frame": index, "path": str(path)})
-        answer({"done": len(order["poses"])})
+                self._images.render(view, path)
+            answer(Rendered(place, str(path)))
 
-    def convert(self, order: dict[str, Any], answer: Any) -> None:
-        """Carry out a convert order."""
+    def _convert(self, order: ConvertOrder) -> None:
         self._loaded = None
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        bpy.ops.import_scene.fbx(filepath=order["source"], use_anim=False)
-        bpy.ops.export_scene.gltf(filepath=order["target"], export_format="GLB", export_animations=False)
-        answer({"done": 1})
+        bpy.ops.import_scene.fbx(filepath=order.source, use_anim=False)
+        bpy.ops.export_scene.gltf(filepath=order.target, export_format="GLB", export_animations=False)
 
 
 def main(threads: int) -> None:
@@ -105,23 +115,25 @@ def main(threads: int) -> None:
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
-    def answer(receipt: dict[str, Any]) -> None:
-        receipts.write(json.dumps(receipt) + "\n")
+    def answer(message: Any) -> None:
+        receipts.write(json.dumps(to_json(message)) + "\n")
 
     version = compat.check_version()
     worker = RenderWorker(threads)
-    orders = {"render": worker.render, "convert": worker.convert}
-    answer({"ready": version})
+    answer(WorkerReady(version))
     for line in sys.stdin:
-        order = json.loads(line)
-        named = {key: value for key, value in order.items() if key not in ("poses", "settings")}
-        print(f"order: {named}", file=sys.stderr, flush=True)
         try:
-            orders[order["op"]](order, answer)
+            order = from_json(json.loads(line))
+            print(f"order: {type(order).__name__} {_named(order)}", file=sys.stderr, flush=True)
+            worker.carry_out(order, answer)
         except Exception as error:
             # The boundary of the process: the whole story goes to the log, one line to the host.
             traceback.print_exc()
-            answer({"error": f"{type(error).__name__}: {' '.join(str(error).split())}"})
+            answer(OrderFailed(f"{type(error).__name__}: {' '.join(str(error).split())}"))
+
+
+def _named(order: Any) -> str:
+    return str(getattr(order, "package", "") or getattr(order, "source", ""))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What ``headturn build`` does with its options, and ``headturn compact``."""
+"""``headturn build`` and ``headturn compact``."""
 
 from __future__ import annotations
 
@@ -11,10 +11,64 @@ from typing import Annotated, Any
 
 import typer
 
-from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out, plural
+from generator import registries
+from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, out, plural
+from generator.cli.options import with_settings
 from generator.cli.reporter import JsonReporter, TerminalReporter
 from generator.errors import HeadturnError
-from generator.plan.config import BuildConfig
+from generator.execution.lanes.options import DEADLINE_S
+from generator.plan.config import BuildConfig, load_config
+from generator.plan.settings import Values, all_settings
+
+
+def build(
+    config_file: Annotated[
+        Path | None, typer.Argument(metavar="[CONFIG.toml]", help="Configuration; flags override it.")
+    ] = None,
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the dataset.")] = Path("dataset"),
+    workers: Annotated[int | None, typer.Option(min=1, help="Lanes; default one a core.")] = None,
+    executor: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(registries.EXECUTORS), help="local, ray for a cluster, or serial for debugging."
+        ),
+    ] = "local",
+    address: Annotated[
+        str | None, typer.Option(help="Ray cluster, such as auto; without it Ray runs here alone.")
+    ] = None,
+    deadline: Annotated[
+        float, typer.Option(min=1, help="Seconds of silence after which a worker is replaced.")
+    ] = DEADLINE_S,
+    memory: Annotated[
+        float | None, typer.Option(min=0, help="MiB a lane may grow to; default 80 % of the machine for all.")
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Delete the dataset that is there first.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,
+    blender: BlenderOption = None,
+    as_json: JsonFlag = False,
+    *,
+    overrides: Values,
+) -> None:
+    """Render every head at every pose, find the landmarks, write the tables.
+
+    Run it again to continue a build that was interrupted, or with more heads or
+    poses to extend it.
+    """
+    run(
+        load_config(config_file, overrides),
+        folder,
+        fresh=fresh,
+        yes=yes,
+        as_json=as_json,
+        executor={
+            "name": executor,
+            "workers": workers,
+            "blender": blender,
+            "deadline_s": deadline,
+            "memory_mib": memory,
+            "address": address,
+        },
+    )
 
 
 def run(
@@ -22,7 +76,7 @@ def run(
 ) -> None:
     """Build, say how it went, and end with the exit code. executor: arguments of open_executor."""
     from generator.dataset.format.manifest import portable_command
-    from generator.execution.build.run import build
+    from generator.execution.build.run import build as build_dataset
     from generator.execution.executors.open import open_executor
     from generator.execution.stopping import Stopped, stoppable
 
@@ -41,7 +95,9 @@ def run(
     command = portable_command(["headturn", *sys.argv[1:]])
     try:
         with stoppable(), reporter, open_executor(**executor) as lanes:
-            result = build(config, folder, lanes, reporter, command=command, fresh=fresh, confirm=confirm)
+            result = build_dataset(
+                config, folder, lanes, reporter, command=command, fresh=fresh, confirm=confirm
+            )
     except Stopped as stopped:
         reporter.event("stopped", {"reason": str(stopped), "exit_code": stopped.exit_code})
         raise
@@ -74,7 +130,9 @@ def compact(
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to headturn."""
+    """Add the commands."""
+    example = "Example: headturn build --heads my_heads --yaw -50,50,10 --preset quality --out dataset"
+    app.command(epilog=example)(with_settings(build, all_settings()))
     app.command(epilog="Example: headturn compact dataset --out dataset-compact")(compact)
 
 

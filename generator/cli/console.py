@@ -23,3 +23,8 @@ def plural(count: int, noun: str) -> str:
 
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="JSON on stdout, for machines.")]
+
+BlenderOption = Annotated[
+    str | None,
+    typer.Option("--blender", help="A Blender executable (4.2 or newer) instead of the bpy wheel."),
+]

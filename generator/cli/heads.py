@@ -79,3 +79,8 @@ def _cell(value: object) -> str:
     if isinstance(value, (list, tuple)):
         return "; ".join(map(str, value))
     return str(value)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.add_typer(heads_app, name="heads")

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from generator.cli.console import JsonFlag
+from generator.cli.console import BlenderOption, JsonFlag
 
 
 def replay(
@@ -18,9 +18,7 @@ def replay(
     sample_id: Annotated[str, typer.Argument(help="Its row, such as p0003/neutral/y+30_p-10_r+0.")],
     heads: Annotated[Path | None, typer.Option(help="Where the head source lies now, if it moved.")] = None,
     picture: Annotated[Path | None, typer.Option("--out", help="Write the new image there.")] = None,
-    blender: Annotated[
-        str | None, typer.Option("--blender", help="A Blender executable instead of the bpy wheel.")
-    ] = None,
+    blender: BlenderOption = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Render one sample again from its head and configuration, and compare every value.

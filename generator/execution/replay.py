@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,16 @@ from generator.dataset.format.manifest import Manifest, read_manifest
 from generator.dataset.format.open import as_array, image_bytes, read_samples
 from generator.dataset.format.part import read_part
 from generator.errors import DatasetError, HeadError, UsageError, WorkerError
-from generator.execution.build.folder import MADE_HEADS
+from generator.execution.build.sources import source_path
+from generator.execution.build.units import build_order
 from generator.execution.executors.open import open_executor
-from generator.execution.lanes.lane import head_to_json
 from generator.execution.lanes.scratch import scratch_folder
 from generator.heads.head import Head
+from generator.heads.placement import Placement
 from generator.heads.source import find_heads
-from generator.landmarks.anchors import pack
-from generator.placing.face import Prepared
-from generator.plan.config import PARAMETRIC, BuildConfig, load_config
+from generator.messages import BuildOrder, Built, expect
+from generator.plan.config import BuildConfig, recorded_config
+from generator.plan.views import Pose, plan_views
 
 COMPARED = ("landmarks", "landmarks_exact")
 
@@ -78,28 +79,25 @@ def replay_sample(
             f"{root}: no sample {sample_id!r}; names are like {example}/neutral/y+30_p-10_r+0, "
             "see the column sample_id"
         )
-    config = load_config(None, manifest.configuration)
+    config = recorded_config(manifest.configuration, root)
     subject, expression = recorded["subject"], recorded["expression"]
     row = next(h for h in read_heads(root) if (h.subject, h.expression) == (subject, expression))
     head = _find(row, config, root, heads)
     anchors = read_anchors(root)[subject, expression]
-    confidence = config.landmarks.min_confidence
-    with (
-        open_executor("local", workers=1, blender=blender, min_confidence=confidence) as lanes,
-        scratch_folder() as scratch,
-    ):
+    with open_executor("local", workers=1, blender=blender) as lanes, scratch_folder() as scratch:
         order = _order(row, head, anchors.points, config, recorded, scratch)
         [outcome] = lanes.run([order], lambda: None)
         if outcome.receipt is None:
             raise WorkerError(f"{sample_id}: cannot be rendered again: {outcome.error}")
-        again = read_part(scratch / outcome.receipt["part"]["path"])
+        built = expect(Built, outcome.receipt)
+        again = read_part(scratch / built.part.path)
         image = image_bytes(scratch, again.to_pylist()[0])
         if picture is not None:
             write_bytes(picture, image)
         differences = [*_differences(recorded, again, image, root, manifest)]
     versions = [
         f"{name}: {manifest.versions.get(name, 'none')} then, {now} now"
-        for name, now in outcome.receipt["versions"].items()
+        for name, now in built.versions.items()
         if manifest.versions.get(name) != now
     ]
     return Replay(sample_id, not differences, tuple(differences), tuple(versions))
@@ -108,8 +106,7 @@ def replay_sample(
 def _find(row: HeadRow, config: BuildConfig, root: Path, moved: Path | None) -> Head:
     """The head of a row, its files checked against the hashes of the build."""
     wanted = config.heads
-    recorded = root / MADE_HEADS if wanted.source == PARAMETRIC else Path(wanted.source)
-    path = moved or recorded
+    path = moved or source_path(config, root)
     again = "give the place it was moved to with --heads, or put it back"
     if not path.exists():
         raise HeadError(f"{path}: the heads of this dataset are not there any more; {again}")
@@ -139,9 +136,9 @@ def _find(row: HeadRow, config: BuildConfig, root: Path, moved: Path | None) -> 
 
 def _order(
     row: HeadRow, head: Head, points: np.ndarray, config: BuildConfig, recorded: dict[str, Any], root: Path
-) -> dict[str, Any]:
+) -> BuildOrder:
     """The build order of one pose, with what preparing the head found at the time."""
-    prepared = Prepared(
+    placement = Placement(
         units=row.units,
         mm_per_unit=row.mm_per_unit,
         up=row.up,
@@ -153,23 +150,11 @@ def _order(
         correction=row.correction,
         correction_sd_deg=row.correction_sd_deg,
     )
-    return {
-        "op": "build",
-        "unit": "again",
-        "head": head_to_json(head),
-        "root": str(root),
-        "configuration_digest": "",
-        "poses": [[recorded[f"{angle}_deg"] for angle in ("yaw", "pitch", "roll")]],
-        "indices": [[recorded[f"{angle}_index"] for angle in ("yaw", "pitch", "roll")]],
-        "settings": config.render.settings().as_dict(),
-        "prepared": prepared.as_dict(),
-        "anchors": pack(points, "<f8"),
-        "distance_mm": row.distance_mm,
-        "split": row.split,
-        "images": "embedded",
-        "image_format": config.dataset.image_format,
-        "passes": list(config.dataset.passes),
-    }
+    pose: Pose = (recorded["yaw_deg"], recorded["pitch_deg"], recorded["roll_deg"])
+    views = plan_views(config.render, row.radius_mm, [pose])
+    indices = (recorded["yaw_index"], recorded["pitch_index"], recorded["roll_index"])
+    order = build_order(head, placement, points, row.split, views, (indices,), config, root)
+    return replace(order, unit="again", images="embedded")
 
 
 def _differences(

@@ -18,35 +18,51 @@ Projection = Literal["perspective", "orthographic"]
 
 @dataclass(frozen=True)
 class Camera:
-    """A square camera that looks along +z of frame C at the head's pivot.
+    """A camera that looks along +z of frame C at the head's pivot.
 
-    resolution: image side in pixels. lens_mm: focal length for a 36 mm sensor.
+    width, height: of the image in pixels, which are square.
+    lens_mm: focal length for a sensor 36 mm wide.
     distance_mm: from the optical centre to the pivot of the rotation.
     projection: "perspective" divides by a point's own depth, "orthographic" by
         the pivot's: all rays are parallel, and the scale is the one that the
         perspective camera has at the pivot.
+    principal_px: (x, y) of the optical axis, pixels; None is the middle of the image.
     """
 
-    resolution: int
+    width: int
+    height: int
     lens_mm: float
     distance_mm: float
     projection: Projection = "perspective"
+    principal_px: tuple[float, float] | None = None
+
+    @classmethod
+    def square(
+        cls, resolution: int, lens_mm: float, distance_mm: float, projection: Projection = "perspective"
+    ) -> Camera:
+        """A camera with square images of so many pixels a side."""
+        return cls(resolution, resolution, lens_mm, distance_mm, projection)
 
     @property
     def focal_px(self) -> float:
         """Focal length in pixels."""
-        return self.resolution * self.lens_mm / SENSOR_MM
+        return self.width * self.lens_mm / SENSOR_MM
 
     @property
     def view_mm(self) -> float:
-        """Side of the square seen at the pivot, mm."""
+        """Width of what is seen at the pivot, mm."""
         return self.distance_mm * SENSOR_MM / self.lens_mm
+
+    @property
+    def centre_px(self) -> np.ndarray:
+        """Where the optical axis meets the image, float64 [2] (x, y)."""
+        return np.array(self.principal_px or (self.width / 2.0, self.height / 2.0), dtype=np.float64)
 
     @property
     def matrix(self) -> np.ndarray:
         """K, float64 [3, 3], pixels. Pixel (i, j) covers [j, j+1) x [i, i+1): centres at +0.5."""
-        centre = self.resolution / 2.0
-        return np.array([[self.focal_px, 0, centre], [0, self.focal_px, centre], [0, 0, 1.0]])
+        x, y = self.centre_px
+        return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1.0]])
 
     @property
     def translation_mm(self) -> np.ndarray:
@@ -57,14 +73,18 @@ class Camera:
         """Pixels of points in frame C. float [..., 3] mm -> float64 [..., 2] (x, y)."""
         points = np.asarray(points_mm, dtype=np.float64)
         depth = points[..., 2:] if self.projection == "perspective" else self.distance_mm
-        return points[..., :2] / depth * self.focal_px + self.resolution / 2.0
+        return points[..., :2] / depth * self.focal_px + self.centre_px
+
+    def holds(self, pixels: np.ndarray) -> np.ndarray:
+        """Which pixels lie in the image. float [..., 2] -> bool [...]."""
+        return ((pixels >= 0) & (pixels <= (self.width, self.height))).all(axis=-1)
 
     def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Origins (at z = 0) and directions (z = 1) in frame C of the rays through pixels.
 
         float [..., 2] -> float64 [..., 3] twice.
         """
-        centred = (np.asarray(pixels, dtype=np.float64) - self.resolution / 2.0) / self.focal_px
+        centred = (np.asarray(pixels, dtype=np.float64) - self.centre_px) / self.focal_px
         ones = np.ones_like(centred[..., :1])
         if self.projection == "perspective":
             return np.zeros((*centred.shape[:-1], 3)), np.concatenate([centred, ones], axis=-1)

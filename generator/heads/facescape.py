@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from generator.errors import HeadError
-from generator.heads.head import Head, SkippedHead
+from generator.heads.head import Finder, Head, SkippedHead
 from generator.heads.mtl import read_mtl
 from generator.heads.paths import find_inside, printable
 
@@ -172,3 +172,6 @@ def _texture_of_mtl(folder: Path, name: str, names: set[str]) -> Path:
             if maps:
                 return find_inside(folder, maps[0], "texture")
     raise HeadError(f"the texture {stem}.jpg is missing")
+
+
+FINDER = Finder(find_facescape, LICENSE)

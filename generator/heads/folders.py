@@ -10,7 +10,7 @@ from pathlib import Path
 from generator.errors import HeadError
 from generator.heads.card import CARD_NAME, HeadCard, read_card
 from generator.heads.gltf import gltf_files
-from generator.heads.head import NEUTRAL, Head, SkippedHead
+from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
 from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key, printable
 from generator.heads.ply import ply_texture
@@ -168,3 +168,6 @@ def _textures(mesh: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         case ".gltf":
             return gltf_files(mesh), ()
     return (), ()
+
+
+FINDER = Finder(find_meshes)

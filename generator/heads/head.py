@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,3 +63,45 @@ class HeadSource:
     kind: str
     heads: tuple[Head, ...]
     skipped: tuple[SkippedHead, ...] = ()
+
+
+@dataclass(frozen=True)
+class Finder:
+    """A kind of head source on disk.
+
+    find: what lies under a path: heads, and what cannot be given with its reason; neither where it is
+        no such source. Meshes are not parsed.
+    license: of all its heads, where that is fixed.
+    """
+
+    find: Callable[[Path], tuple[list[Head], list[SkippedHead]]]
+    license: str = ""
+
+
+@dataclass(frozen=True)
+class Made:
+    """Heads that were asked for, of those that lie in a folder of made heads."""
+
+    subjects: tuple[str, ...]
+    expressions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """Which heads are to be made. argument: what stands behind the maker's name, such as a path."""
+
+    argument: str
+    count: int
+    seed: int
+    sampled_expressions: int
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A kind of head source that is made on the spot.
+
+    make: writes the heads of a wish into a folder, which may hold some already, and calls the
+        function once a head.
+    """
+
+    make: Callable[[Path, Wish, Callable[[], None]], Made]

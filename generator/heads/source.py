@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from generator import registries
 from generator.errors import HeadError, UsageError
-from generator.heads.facescape import EXPRESSIONS, LICENSE, expression_number, find_facescape
-from generator.heads.folders import SUFFIXES, UNKNOWN_LICENSE, find_meshes
-from generator.heads.head import Head, HeadSource, SkippedHead
+from generator.heads.facescape import EXPRESSIONS, expression_number
+from generator.heads.folders import SUFFIXES, UNKNOWN_LICENSE
+from generator.heads.head import Finder, Head, HeadSource, SkippedHead
 from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
 
 
@@ -53,17 +54,15 @@ def find_heads(
     if up is not None and forward is not None:
         axes_rotation(up, forward)
     try:
-        kind = "facescape"
-        heads, skipped = find_facescape(path)
-        if not heads and not skipped:
-            heads, skipped = find_meshes(path)
-            kind = heads[0].source if heads and len({h.source for h in heads}) == 1 else "mesh"
+        kind, finder, heads, skipped = _search(path)
     except (HeadError, OSError) as error:
         raise UsageError(f"{path} cannot be searched: {error}") from error
     if not heads and not skipped:
         raise UsageError(_nothing_found(path))
-    if kind == "facescape" and (redistributable or license not in (None, LICENSE)):
-        raise UsageError(f"{path} is FaceScape, whose licence is fixed; remove --license, --redistributable")
+    if finder.license and (redistributable or license not in (None, finder.license)):
+        raise UsageError(
+            f"{path} is {kind}, whose licence is {finder.license}; remove --license and --redistributable"
+        )
     if expressions is not None:
         heads, skipped = _select(heads, skipped, expressions)
     given = [
@@ -79,6 +78,17 @@ def find_heads(
         for head in heads
     ]
     return HeadSource(path, kind, tuple(given), tuple(skipped))
+
+
+def _search(path: Path) -> tuple[str, Finder, list[Head], list[SkippedHead]]:
+    """The first kind of source that finds something, and what it finds; else the last kind."""
+    for kind in registries.HEAD_FINDERS:
+        finder: Finder = registries.HEAD_FINDERS.get(kind)
+        heads, skipped = finder.find(path)
+        if heads or skipped:
+            break
+    sources = {head.source for head in heads}
+    return (sources.pop() if len(sources) == 1 else kind), finder, heads, skipped
 
 
 def _nothing_found(path: Path) -> str:

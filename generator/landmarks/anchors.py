@@ -1,44 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surface anchors: the 468 landmarks as points of the mesh, from a few near-frontal views.
-
-What a detector finds on one image is off by a pixel or two, and differently so on the next.
-The landmarks of several slightly turned views are cast onto the surface and averaged there;
-from then on they are exact at any pose, and the detector is no longer needed.
-"""
+"""Surface anchors: the landmarks as points of a mesh, exact at any pose."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from generator.geometry.camera import Camera
 from generator.geometry.rigid import fit_similarity
-from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
 from generator.landmarks.detector import POINTS
-from generator.landmarks.reference_face import mirror_pairs, surface_face
-from generator.landmarks.surface import Surface
-
-MAX_OFF_MM = 15.0
-"""A landmark farther beside the silhouette than this has no place on the mesh."""
-
-MAX_ASTRAY_MM = 30.0
-"""A landmark farther from its place in the mean face is not on the face. Faces are within 20 mm."""
-
-MAX_SLIDE_MM = 2.0
-"""The mean of the hits is put on the surface along the camera's axis if that moves it no
-farther than this, and otherwise to the nearest point."""
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """One detection. rotation: R_C [3, 3]. pixels: float [468, 2]."""
-
-    rotation: np.ndarray
-    pixels: np.ndarray
+from generator.landmarks.reference_face import mirror_pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,153 +62,8 @@ class Anchors:
         """The points after a rotation of the head, float64 [468, 3]. rotation: R_C [3, 3]."""
         return self.points @ np.asarray(rotation).T
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; arrays as base64 of their little-endian bytes."""
-        return {
-            "triangles": pack(self.triangles, "<i4"),
-            "weights": pack(self.weights, "<f8"),
-            "points": pack(self.points, "<f8"),
-            "views": self.views,
-            "off": self.off,
-            "residual_px": self.residual_px,
-            "residual_mm": self.residual_mm,
-        }
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Anchors:
-        """The inverse of :meth:`as_dict`."""
-        return cls(
-            **{
-                **values,
-                "triangles": unpack(values["triangles"], "<i4"),
-                "weights": unpack(values["weights"], "<f8").reshape(POINTS, 3),
-                "points": unpack(values["points"], "<f8").reshape(POINTS, 3),
-            }
-        )
-
 
 def no_anchors() -> Anchors:
     """Anchors of a head on which no face was found."""
     nothing = np.full((POINTS, 3), np.nan)
     return Anchors(np.full(POINTS, -1, dtype=np.int32), nothing, nothing)
-
-
-def _rounded(weights: np.ndarray, decimals: int) -> np.ndarray:
-    """Barycentric weights [N, 3] with so many decimals, the largest such that they still add up to 1."""
-    rounded = np.round(weights, decimals)
-    largest = np.argmax(rounded, axis=1)[:, None]
-    rest = np.take_along_axis(rounded, largest, axis=1) + 1.0 - rounded.sum(axis=1, keepdims=True)
-    np.put_along_axis(rounded, largest, rest, axis=1)
-    return rounded
-
-
-def find_anchors(surface: Surface, views: Sequence[View], camera: Camera) -> Anchors:
-    """Cast every view's landmarks onto the surface and average them there.
-
-    views: at least one, of the surface seen by camera. Points whose rays miss the surface use
-    the vertex nearest to the ray, up to 15 mm away; see :class:`Anchors` for what is counted.
-    """
-    hits, missed = zip(*(_cast(surface, view, camera) for view in views), strict=True)
-    found, beside = np.stack(hits), np.stack(missed)
-    centre, astray = _brought_back(_robust_mean(found))
-    triangles, weights = _onto(surface, centre)
-    absent = np.isnan(centre).any(axis=1)
-    triangles[absent], weights[absent] = -1, np.nan
-    # The last digits of a fit change from run to run, and units are named by what they rest on.
-    # A millionth of a triangle is a few nanometres.
-    weights = _rounded(weights, 6)
-    points = surface.points(triangles, weights)
-    distances = np.linalg.norm(np.where(beside[..., None], np.nan, found) - points, axis=2)
-    seen = [camera.project(points @ view.rotation.T + camera.translation_mm) for view in views]
-    pixels = [np.linalg.norm(p - view.pixels, axis=1) for p, view in zip(seen, views, strict=True)]
-    return Anchors(
-        triangles=triangles,
-        weights=weights,
-        points=points,
-        views=len(views),
-        off=int((astray | (beside.mean(axis=0) > 0.5))[~absent].sum()),
-        residual_px=_rms(np.stack(pixels)),
-        residual_mm=float(np.nanmedian(distances)) if np.isfinite(distances).any() else float("nan"),
-    )
-
-
-def cast_views(surface: Surface, views: Sequence[View], camera: Camera) -> np.ndarray:
-    """Each view's own landmarks on the surface, float64 [views, 468, 3], frame C at pose zero."""
-    return np.stack([_cast(surface, view, camera)[0] for view in views])
-
-
-def _cast(surface: Surface, view: View, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    origins, directions = camera.rays(view.pixels)
-    origins = (origins - camera.translation_mm) @ view.rotation
-    directions = directions @ view.rotation
-    hits = surface.first_hits(origins, directions)
-    missed = hits.triangles < 0
-    points = hits.points.copy()
-    for row in np.flatnonzero(missed):
-        along = directions[row] / np.linalg.norm(directions[row])
-        from_ray = surface.vertices - origins[row]
-        from_ray = from_ray - (from_ray @ along)[:, None] * along
-        distance = np.linalg.norm(from_ray, axis=1)
-        nearest = int(distance.argmin())
-        points[row] = surface.vertices[nearest] if distance[nearest] <= MAX_OFF_MM else np.nan
-    return points, missed
-
-
-def _robust_mean(points: np.ndarray) -> np.ndarray:
-    """Mean of the points no farther from their median than twice the median distance.
-
-    [views, P, 3] -> [P, 3]; NaN where less than half of the views have a point.
-    """
-    known = np.isfinite(points).all(axis=2)
-    enough = known.mean(axis=0) >= 0.5
-    result = np.full(points.shape[1:], np.nan)
-    for row in np.flatnonzero(enough):
-        cloud = points[known[:, row], row]
-        distance = np.linalg.norm(cloud - np.median(cloud, axis=0), axis=1)
-        result[row] = cloud[distance <= 2 * np.median(distance) + 1e-9].mean(axis=0)
-    return result
-
-
-def _brought_back(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points far from any face moved to their place in the mean face, and which they were.
-
-    A ray that passes the jaw by a hair's breadth meets the hair behind it. [468, 3] -> the same, bool [468].
-    """
-    known = np.isfinite(points).all(axis=1)
-    if known.sum() < 3:
-        return points, np.zeros(len(points), dtype=bool)
-    reference = surface_face() @ CAMERA_FROM_GRAPHICS
-    fit = fit_similarity(reference[known], points[known])
-    expected = fit.scale * reference @ fit.rotation.T + fit.translation
-    astray = known & (np.linalg.norm(points - expected, axis=1) > MAX_ASTRAY_MM * fit.scale)
-    return np.where(astray[:, None], expected, points), astray
-
-
-def _onto(surface: Surface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points of the surface that stand for points near it."""
-    known = np.isfinite(points).all(axis=1)
-    start = np.where(known[:, None], points, 0.0)
-    depth = float(surface.vertices[:, 2].min()) - 1.0
-    front = surface.first_hits(
-        np.column_stack([start[:, :2], np.full(len(start), depth)]), np.tile([0.0, 0.0, 1.0], (len(start), 1))
-    )
-    triangles, weights = front.triangles.copy(), front.weights.copy()
-    slide = np.linalg.norm(front.points - start, axis=1)
-    far = known & ~(slide <= MAX_SLIDE_MM)
-    triangles[far], weights[far] = surface.nearest(points[far])
-    return triangles, weights
-
-
-def _rms(distances: np.ndarray) -> float:
-    known = distances[np.isfinite(distances)]
-    return float(np.sqrt((known**2).mean())) if len(known) else float("nan")
-
-
-def pack(values: np.ndarray, kind: str) -> str:
-    """An array as text. kind: a little-endian dtype such as "<f8"."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
-
-
-def unpack(text: str, kind: str) -> np.ndarray:
-    """The flat array of :func:`pack`."""
-    return np.frombuffer(base64.b64decode(text), dtype=kind).copy()

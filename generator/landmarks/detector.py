@@ -7,6 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from generator import registries
+from generator.plan.settings import Landmarks
+
 TOPOLOGY = "mediapipe-face-mesh-468"
 POINTS = 468
 
@@ -39,3 +42,9 @@ class Detector(Protocol):
     def close(self) -> None:
         """Free the model."""
         ...
+
+
+def open_detector(landmarks: Landmarks) -> Detector:
+    """The detector of some settings. Raises UsageError: an unknown name. WorkerError: it cannot start."""
+    detector: Detector = registries.DETECTORS.get(landmarks.detector)(landmarks.min_confidence)
+    return detector

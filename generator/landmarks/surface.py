@@ -13,9 +13,9 @@ from embreex.rtcore_scene import EmbreeScene
 from trimesh.triangles import closest_point, points_to_barycentric
 
 from generator.errors import HeadError
-from generator.geometry.camera import Camera
-from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
+from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
+from generator.plan.views import Views
 
 HOLES = 8
 """Transparent layers a ray goes through, as many as the renderer's."""
@@ -117,24 +117,25 @@ class Surface:
             triangles[row], weights[row] = near[best], candidates[best]
         return triangles, weights
 
-    def visible(self, points: np.ndarray, rotations: np.ndarray, camera: Camera) -> np.ndarray:
-        """Which points of the surface the camera sees at each pose.
+    def visible(self, points: np.ndarray, views: Views) -> np.ndarray:
+        """Which points of the surface the camera of each view sees.
 
         Parameters
         ----------
         points: float [P, 3], frame C at pose zero, mm; NaN is never visible.
-        rotations: float [N, 3, 3], R_C.
 
         Returns
         -------
         bool [N, P]: inside the image, with nothing in front.
         """
         known = np.flatnonzero(np.isfinite(points).all(axis=1))
-        seen = np.zeros((len(rotations), len(points)), dtype=bool)
-        for row, rotation in enumerate(rotations):
+        seen = np.zeros((len(views), len(points)), dtype=bool)
+        rotations = rotation_from_angles(views.angles_deg)
+        for row, (view, rotation) in enumerate(zip(views, rotations, strict=True)):
+            camera = view.camera
             posed = points[known] @ rotation.T + camera.translation_mm
             pixels = camera.project(posed)
-            inside = ((pixels >= 0) & (pixels <= camera.resolution)).all(axis=1)
+            inside = camera.holds(pixels)
             origins, directions = camera.rays(pixels)
             depth = posed[:, 2]
             # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).

@@ -8,13 +8,10 @@ face, and the landmarks that matter are cast back onto the surface.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
 
 from generator.errors import HeadError
@@ -24,14 +21,12 @@ from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
+from generator.heads.placement import Placement
 from generator.heads.units import CANDIDATE_AXES, MM_PER_UNIT, axes_rotation, guess_units
 from generator.landmarks.detector import CHIN, LEFT_EYE_OUTER, NOSE_TIP, RIGHT_EYE_OUTER, Detector
-from generator.placing.rendering import HeadRenderer
-from generator.plan.render_settings import RenderSettings
-
-log = logging.getLogger(__name__)
-
-IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+from generator.placing.rendering import HeadRenderer, read_image
+from generator.plan.settings import Look
+from generator.plan.views import View, Views
 
 PIVOT_DEPTH = 1.00
 """Depth of the ear axis behind the outer eye corners, in outer-eye distances.
@@ -45,9 +40,8 @@ REACH = 2.0
 MAX_TILT_DEG = 40.0
 """A face turned more than this from the front means the axes are wrong."""
 
-_LOOK = RenderSettings(
-    resolution=384, lens_mm=200.0, samples=4, light_yaw_deg=0.0, light_pitch_deg=20.0, ambient=0.5
-)
+_PIXELS, _LENS_MM = 384, 200.0
+_LOOK = Look(samples=4, light_yaw_deg=0.0, light_pitch_deg=20.0, ambient=0.5)
 _WINDOWS = (1.0, 0.6, 0.36, 0.22)
 """Share of the mesh's height that is looked at, from the crown down: a head, a bust, a body."""
 
@@ -55,54 +49,9 @@ _FACE_WINDOW = 3.4
 """Side of the second, sharp look, in outer-eye distances."""
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """What turns a source's mesh into a head in frame U, mm, with its pivot at the origin.
-
-    units, mm_per_unit, up, forward: of the source. pivot: in source units and
-    axes. radius_mm: of the sphere about the pivot that holds the head.
-    eye_distance_mm: between the outer eye corners. notes: what was guessed.
-    frame: "source" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
-    :meth:`normalise` only where frame is "canonical".
-    """
-
-    units: str
-    mm_per_unit: float
-    up: str
-    forward: str
-    pivot: tuple[float, float, float]
-    radius_mm: float
-    eye_distance_mm: float
-    notes: tuple[str, ...] = ()
-    frame: str = "source"
-    correction: tuple[float, ...] = IDENTITY
-    correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
-
-    @property
-    def levelling(self) -> np.ndarray:
-        """R_U [3, 3] that is applied before any pose: the correction, or nothing."""
-        return np.array(self.correction if self.frame == "canonical" else IDENTITY).reshape(3, 3)
-
-    def normalise(self, mesh: HeadMesh) -> HeadMesh:
-        """The mesh in frame U at the chosen pose zero, mm, pivot at the origin."""
-        centred = (mesh.vertices - np.array(self.pivot)) * self.mm_per_unit
-        rotation = self.levelling @ axes_rotation(self.up, self.forward)
-        return replace(mesh, vertices=centred @ rotation.T)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Prepared:
-        """The inverse of :meth:`as_dict`."""
-        lists = ("pivot", "notes", "correction", "correction_sd_deg")
-        return cls(**{**values, **{name: tuple(values[name]) for name in lists}})
-
-
-def prepare(
+def find_face(
     head: Head, mesh: HeadMesh, renderer: HeadRenderer, detector: Detector, scratch: Path
-) -> Prepared:
+) -> Placement:
     """Find the face of one head; see the module's docstring.
 
     Raises HeadError if no face is found from the front, or its size fits no unit.
@@ -136,7 +85,7 @@ class _Face:
     chin: np.ndarray
 
 
-def _measure(head: Head, mesh: HeadMesh, face: _Face, up: str, forward: str, *, guessed: bool) -> Prepared:
+def _measure(head: Head, mesh: HeadMesh, face: _Face, up: str, forward: str, *, guessed: bool) -> Placement:
     eyes = float(np.linalg.norm(face.left_eye - face.right_eye))
     notes = []
     if head.units is not None:
@@ -155,7 +104,7 @@ def _measure(head: Head, mesh: HeadMesh, face: _Face, up: str, forward: str, *, 
     # and the same numbers are then printed, stored and used.
     in_source_axes = pivot @ axes_rotation(up, forward)
     step = 0.01 / scale
-    return Prepared(
+    return Placement(
         units=units,
         mm_per_unit=scale,
         up=up,
@@ -202,16 +151,14 @@ def _look(
     mm = 300.0 / side
     seen = replace(mesh, vertices=(mesh.vertices - centre) * mm)
     # From outside everything: nothing of the mesh may lie behind the camera.
-    distance = max(150.0 * _LOOK.lens_mm / 18.0, float(seen.vertices[:, 2].max()) * 1.1)
+    distance = max(150.0 * _LENS_MM / 18.0, float(seen.vertices[:, 2].max()) * 1.1)
+    camera = Camera.square(_PIXELS, _LENS_MM, distance)
     package = scratch / "look.npz"
     save_package(seen, package)
-    [frame] = renderer.render(package, _LOOK, distance, [(0.0, 0.0, 0.0)])
-    image = cv2.cvtColor(cv2.imread(str(frame)), cv2.COLOR_BGR2RGB)
-    frame.unlink()
-    landmarks = detector.detect(image)
+    [path] = renderer.render(package, Views.of([View((0.0, 0.0, 0.0), camera, _LOOK)]))
+    landmarks = detector.detect(read_image(path))
     if landmarks is None or not _is_frontal(landmarks):
         return None
-    camera = Camera(_LOOK.resolution, _LOOK.lens_mm, distance)
     pixels = landmarks[[RIGHT_EYE_OUTER, LEFT_EYE_OUTER, CHIN], :2]
     origins, rays = camera.rays(pixels)
     vertices = seen.vertices @ CAMERA_FROM_GRAPHICS + camera.translation_mm

@@ -1,149 +1,86 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The build configuration: one TOML file, or the flags that say the same."""
+"""The build configuration: one TOML file, or the flags that say the same; settings.py says what may
+stand in it."""
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from generator import registries
 from generator.errors import UsageError
-from generator.plan.poses import PosePlan, csv_plan, grid_plan, sobol_plan, uniform_plan
-from generator.plan.render_settings import RenderSettings
+from generator.plan.settings import (
+    SECTIONS,
+    Dataset,
+    Heads,
+    Landmarks,
+    Poses,
+    Render,
+    Setting,
+    Values,
+    all_settings,
+    plain,
+    section_settings,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-PARAMETRIC = "parametric"
-Axis = Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"]
-PRESET_SAMPLES = {"fast": 1, "quality": 4}
 
+@dataclass(frozen=True)
+class BuildConfig:
+    """Everything that decides a dataset's content, and nothing else.
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Heads(_Section):
-    """Which heads. ``source`` is a path, or "parametric" for heads made on the spot."""
-
-    source: str = PARAMETRIC
-    count: int = Field(3, ge=1)
-    seed: int = Field(0, ge=0)
-    sampled_expressions: int = Field(0, ge=0)
-    subjects: list[str] | None = None
-    expressions: list[str] | None = None
-    license: str | None = None
-    redistributable: bool | None = None
-    units: Literal["um", "mm", "cm", "dm", "m"] | None = None
-    up: Axis | None = None
-    forward: Axis | None = None
-
-
-class Poses(_Section):
-    """Which poses; see generator.plan.poses. Ranges are [start, stop, step] or [low, high].
-
-    ``frame``: where pose zero is: the mesh's own axes ("source"), or every head levelled to
-    the same face ("canonical").
+    base: where relative paths count from: the folder of the configuration file, the working
+    directory for flags.
     """
 
-    frame: Literal["source", "canonical"] = "source"
+    heads: Heads = field(default_factory=Heads)
+    poses: Poses = field(default_factory=Poses)
+    render: Render = field(default_factory=Render)
+    landmarks: Landmarks = field(default_factory=Landmarks)
+    dataset: Dataset = field(default_factory=Dataset)
+    base: Path = field(default_factory=Path.cwd, compare=False)
 
-    kind: Literal["grid", "uniform", "sobol", "csv"] = "grid"
-    yaw: list[float] = [-50, 50, 10]
-    pitch: list[float] = [-40, 40, 10]
-    roll: list[float] = [-30, 30, 10]
-    count: int = Field(693, ge=1)
-    seed: int = Field(0, ge=0)
-    path: str | None = None
+    def as_dict(self) -> Values:
+        """Plain values for JSON, section by section."""
+        return {name: plain_values(getattr(self, name)) for name in SECTIONS}
 
-    def plan(self) -> PosePlan:
-        """The pose plan these settings describe. UsageError if they make no sense."""
-        if self.kind == "csv":
-            if self.path is None:
-                raise UsageError("poses.path: a CSV pose plan needs the path of its file")
-            return csv_plan(Path(self.path))
-        if self.kind == "grid":
-            for name, axis in (("yaw", self.yaw), ("pitch", self.pitch), ("roll", self.roll)):
-                if len(axis) != 3:
-                    raise UsageError(f"poses.{name}: a grid needs start, stop and step, got {axis}")
-            return grid_plan(tuple(self.yaw), tuple(self.pitch), tuple(self.roll))
-        draw = uniform_plan if self.kind == "uniform" else sobol_plan
-        ranges = {name: (getattr(self, name)[0], getattr(self, name)[1]) for name in ("yaw", "pitch", "roll")}
-        return draw(self.count, self.seed, **ranges)
+    @property
+    def makes_heads(self) -> bool:
+        """Are the heads made on the spot?"""
+        return is_made(self.heads.source)
 
+    def located(self, path: str) -> Path:
+        """A path setting as an absolute path."""
+        return Path(os.path.abspath(self.base / path))
 
-class Render(_Section):
-    """How images are made; see generator.plan.render_settings."""
-
-    preset: Literal["fast", "quality"] = "fast"
-    samples: int | None = Field(None, ge=1, le=4096)
-    resolution: int = Field(256, ge=16, le=4096)
-    lens_mm: float = Field(85.0, ge=10, le=1000)
-    projection: Literal["perspective", "orthographic"] = "perspective"
-    distance_mm: float | None = Field(None, ge=100, le=100_000)
-    margin: float = Field(1.05, ge=0.5, le=10)
-    light_yaw_deg: float = Field(25.0, ge=-180, le=180)
-    light_pitch_deg: float = Field(35.0, ge=-90, le=90)
-    ambient: float = Field(0.35, ge=0, le=1)
-    background: tuple[float, float, float] = (0.5, 0.5, 0.5)
-
-    def settings(self) -> RenderSettings:
-        """The settings the render worker understands."""
-        values = self.model_dump()
-        if values["samples"] is None:
-            values["samples"] = PRESET_SAMPLES[self.preset]
-        return RenderSettings.from_dict(values)
-
-    @model_validator(mode="after")
-    def _background_in_range(self) -> Render:
-        if not all(0 <= c <= 1 for c in self.background):
-            raise ValueError("background is three sRGB values between 0 and 1")
-        return self
+    def moved_to(self, root: Path) -> BuildConfig:
+        """The same configuration as a file in the folder root says it: relative paths count from there."""
+        values = self.as_dict()
+        for setting in _paths(values):
+            value = values[setting.section][setting.key]
+            if not Path(value).is_absolute():
+                values[setting.section][setting.key] = _relative(self.located(value), root)
+        return replace(_validated(values, "configuration"), base=root)
 
 
-class Landmarks(_Section):
-    """Which detector finds the landmarks."""
-
-    detector: Literal["mediapipe"] = "mediapipe"
-    min_confidence: float = Field(0.5, gt=0, le=1)
-
-
-class Dataset(_Section):
-    """What is written. ``validation``: share of the subjects that go to the validation split."""
-
-    images: Literal["files", "embedded", "none"] = "files"
-    image_format: Literal["png", "jpg"] = "png"
-    passes: list[Literal["depth", "normal", "position", "uv", "object_index"]] = []
-    validation: float = Field(0.0, ge=0, le=1)
-    unit_size: int = Field(100, ge=1, le=100_000)
-
-
-class BuildConfig(_Section):
-    """Everything that decides a dataset's content, and nothing else."""
-
-    heads: Heads = Heads()
-    poses: Poses = Poses()
-    render: Render = Render()
-    landmarks: Landmarks = Landmarks()
-    dataset: Dataset = Dataset()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return self.model_dump(mode="json")
-
-
-def load_config(path: Path | None, overrides: dict[str, dict[str, Any]]) -> BuildConfig:
+def load_config(path: Path | None, overrides: Mapping[str, Mapping[str, Any]]) -> BuildConfig:
     """Read a TOML file and lay the flags over it.
 
     Parameters
     ----------
-    path: None means all defaults.
-    overrides: section -> key -> value.
+    path: None means all defaults. Relative paths in it count from its folder.
+    overrides: section -> key -> value. Relative paths in it count from the working directory.
 
     Raises
     ------
@@ -151,38 +88,141 @@ def load_config(path: Path | None, overrides: dict[str, dict[str, Any]]) -> Buil
         out of range.
     """
     values: dict[str, Any] = {}
+    base = Path.cwd()
     if path is not None:
-        try:
-            values = tomllib.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError as error:
-            raise UsageError(f"{path}: there is no such configuration file") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-            raise UsageError(f"{path}: not a TOML configuration: {error}") from error
+        values, base = _read_toml(path), path.absolute().parent
     for section, changes in overrides.items():
         merged = values.setdefault(section, {})
         if not isinstance(merged, dict):
             raise UsageError(f"{path}: [{section}] must be a table")
         merged.update(changes)
-    try:
-        return BuildConfig.model_validate(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        given = "" if first["type"] in ("missing", "extra_forbidden") else f", got {first['input']!r}"
-        raise UsageError(f"{path or 'configuration'}: {where}: {first['msg']}{given}") from error
+    if path is not None:
+        for setting in _paths(overrides):
+            values[setting.section][setting.key] = str(
+                Path(overrides[setting.section][setting.key]).absolute()
+            )
+    return replace(_validated(values, path or "configuration"), base=base)
+
+
+def is_made(source: str) -> bool:
+    """Does a head source name a maker and no path?"""
+    return source.partition(":")[0] in registries.HEAD_MAKERS
+
+
+def recorded_config(values: Values, root: Path) -> BuildConfig:
+    """The configuration that a dataset in the folder root recorded: its paths count from there.
+
+    Datasets of the first release say nothing of poses.same, which they were. Their paths counted from
+    the working directory of the build: where nothing lies there as seen from root, they count from the
+    one of this process. Raises UsageError as :func:`load_config` does.
+    """
+    values = {**values, "poses": {"same": True, **values.get("poses", {})}}
+    for setting in _paths(values):
+        value = Path(values[setting.section][setting.key])
+        if not value.is_absolute() and not (root / value).exists() and value.exists():
+            section = {**values[setting.section], setting.key: str(value.absolute())}
+            values = {**values, setting.section: section}
+    return replace(_validated(values, root), base=root)
+
+
+def read_recorded(file: Path) -> BuildConfig:
+    """:func:`recorded_config` of the file config.toml of a dataset."""
+    return recorded_config(_read_toml(file), file.parent)
 
 
 def config_toml(config: BuildConfig) -> str:
     """The resolved configuration as TOML; None values are left out, as TOML has none."""
-    return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
+    values = config.as_dict()
+    return tomli_w.dumps(
+        {name: {k: v for k, v in table.items() if v is not None} for name, table in values.items()}
+    )
 
 
-def differences(ours: BuildConfig, theirs: BuildConfig) -> list[str]:
-    """One ``section.key: theirs -> ours`` a setting that differs."""
-    a, b = theirs.as_dict(), ours.as_dict()
+def differences(ours: BuildConfig, theirs: BuildConfig) -> dict[str, str]:
+    """ "section.key" -> "section.key: theirs -> ours" of each setting that differs."""
+    found = {}
+    for setting in all_settings():
+        a, b = (_comparable(config, setting) for config in (theirs, ours))
+        if a != b:
+            found[setting.name] = f"{setting.name}: {a!r} -> {b!r}"
+    return found
+
+
+def plain_values(section: Any) -> dict[str, Any]:
+    """The settings of one section as JSON has them."""
+    return {key: plain(value) for key, value in asdict(section).items()}
+
+
+def _comparable(config: BuildConfig, setting: Setting) -> Any:
+    value = plain(getattr(getattr(config, setting.section), setting.key))
+    if setting.info.path and value is not None and not is_made(value):
+        return str(config.located(value))
+    return value
+
+
+def _paths(values: Mapping[str, Any]) -> list[Setting]:
+    """The settings of paths that are given."""
     return [
-        f"{section}.{key}: {a[section][key]!r} -> {b[section][key]!r}"
-        for section in a
-        for key in a[section]
-        if a[section][key] != b[section][key]
+        known
+        for known in all_settings()
+        if known.info.path
+        and isinstance(values.get(known.section), Mapping)
+        and isinstance(values[known.section].get(known.key), str)
+        and not is_made(values[known.section][known.key])
     ]
+
+
+def _relative(path: Path, root: Path) -> str:
+    try:
+        return Path(os.path.relpath(path, root)).as_posix()
+    except ValueError:  # another drive
+        return str(path)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: there is no such configuration file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise UsageError(f"{path}: not a TOML configuration: {error}") from error
+
+
+def _validated(values: Mapping[str, Any], where: object) -> BuildConfig:
+    models = {name: _model(name, section) for name, section in SECTIONS.items()}
+    config = ConfigDict(extra="forbid")
+    sections: dict[str, Any] = {name: (model, model()) for name, model in models.items()}
+    whole = create_model("configuration", __config__=config, **sections)
+    try:
+        found = whole.model_validate(plain(dict(values)))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        given = "" if first["type"] in ("missing", "extra_forbidden") else f", got {first['input']!r}"
+        raise UsageError(f"{where}: {place}: {first['msg']}{given}") from error
+    return BuildConfig(**{name: section(**dict(getattr(found, name))) for name, section in SECTIONS.items()})
+
+
+def _model(name: str, section: type) -> type[BaseModel]:
+    """What pydantic checks of one section."""
+    made: dict[str, Any] = {
+        setting.key: (_checked(setting.kind, setting), setting.default)
+        for setting in section_settings(name, section)
+    }
+    return create_model(name, __config__=ConfigDict(extra="forbid"), **made)
+
+
+def _checked(kind: Any, setting: Setting) -> Any:
+    """The type of a setting with its limits, on each number of a list."""
+    arguments = get_args(kind)
+    if type(None) in arguments:
+        return Union[_checked(arguments[0], setting), None]  # noqa: UP007  built at run time
+    if get_origin(kind) is tuple:
+        inner = tuple(_checked(inner, setting) if inner is not ... else ... for inner in arguments)
+        return tuple[inner]  # type: ignore[valid-type]
+    if kind is str and setting.choices:
+        return Literal[tuple(choice.value for choice in setting.choices)]
+    info = setting.info
+    if (info.low, info.high, info.above) == (None, None, None):
+        return kind
+    return Annotated[kind, Field(ge=info.low, le=info.high, gt=info.above)]

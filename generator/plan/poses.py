@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import UsageError
+from generator.plan.draws import Seed
 
 ANGLES = ("yaw", "pitch", "roll")
 OFF_GRID = -1
@@ -25,7 +26,7 @@ _MAX_INDEX = np.iinfo(np.int16).max
 
 @dataclass(frozen=True, eq=False)
 class PosePlan:
-    """The poses of one dataset, the same for every head.
+    """The poses of a head.
 
     angles_deg: float64 [N, 3], (yaw, pitch, roll) in degrees, sorted
         lexicographically, no pose twice.
@@ -55,6 +56,9 @@ def grid_plan(
     ------
     UsageError: the step does not divide its range, or a limit is out of bounds.
     """
+    for name, axis in zip(ANGLES, (yaw, pitch, roll), strict=True):
+        if len(axis) != 3:
+            raise UsageError(f"poses.{name}: a grid needs start, stop and step, got {list(axis)}")
     axes = [_axis(name, *axis) for name, axis in zip(ANGLES, (yaw, pitch, roll), strict=True)]
     count = math.prod(len(axis) for axis in axes)
     if count > MAX_POSES:
@@ -67,7 +71,7 @@ def grid_plan(
 
 def uniform_plan(
     count: int,
-    seed: int,
+    seed: Seed,
     yaw: Sequence[float] = (-50, 50),
     pitch: Sequence[float] = (-40, 40),
     roll: Sequence[float] = (-30, 30),
@@ -89,7 +93,7 @@ def uniform_plan(
 
 def sobol_plan(
     count: int,
-    seed: int,
+    seed: Seed,
     yaw: Sequence[float] = (-50, 50),
     pitch: Sequence[float] = (-40, 40),
     roll: Sequence[float] = (-30, 30),
@@ -149,34 +153,23 @@ def csv_plan(path: Path) -> PosePlan:
     return _plan(np.array(list(rows)), np.array([indices for _, indices in rows.values()]), "csv")
 
 
-def write_poses_csv(plan: PosePlan, path: Path) -> None:
-    """Write a plan so that :func:`csv_plan` gives the same angles and indices, bit by bit."""
-    Path(path).write_text(poses_csv(plan), encoding="utf-8", newline="\n")
-
-
-def poses_csv(plan: PosePlan, chunks: Iterable[int] | None = None) -> str:
-    """The text of :func:`write_poses_csv`, with a last column that says which poses are built together."""
-    names = [f"{angle}_{what}" for what in ("deg", "index") for angle in ANGLES]
-    columns = [*plan.angles_deg.T.tolist(), *plan.indices.T.tolist()]
-    if chunks is not None:
-        names.append("chunk")
-        columns.append([int(number) for number in chunks])
-    rows = (",".join(map(repr, row)) for row in zip(*columns, strict=True))
-    return "\n".join([",".join(names), *rows]) + "\n"
-
-
 def pose_name(yaw: float, pitch: float, roll: float) -> str:
     """A name for files and labels, such as "y+10_p-20.5_r+0": exact, so unique to the pose."""
     parts = (f"{float(angle) + 0.0:+}".removesuffix(".0") for angle in (yaw, pitch, roll))
     return "_".join(letter + part for letter, part in zip("ypr", parts, strict=True))
 
 
-def _plan(angles: np.ndarray, indices: np.ndarray, kind: str) -> PosePlan:
+def plan_of(angles: np.ndarray, indices: np.ndarray, kind: str = "csv") -> tuple[PosePlan, np.ndarray]:
+    """A plan of poses in any order, none twice, and the order into which it put them, int64 [N]."""
     angles = angles.astype(np.float64) + 0.0  # turns -0.0 into 0.0: one pose, one name
     order = np.lexsort(angles.T[::-1])
     angles, indices = angles[order], indices.astype(np.int16)[order]
     angles.flags.writeable = indices.flags.writeable = False
-    return PosePlan(angles, indices, kind)
+    return PosePlan(angles, indices, kind), order
+
+
+def _plan(angles: np.ndarray, indices: np.ndarray, kind: str) -> PosePlan:
+    return plan_of(angles, indices, kind)[0]
 
 
 def _axis(name: str, start: float, stop: float, step: float) -> np.ndarray:
@@ -231,8 +224,10 @@ def _random_plan(
         raise UsageError(f"{kind}: {count} poses asked for, expected at least 1")
     if count > MAX_POSES:
         raise UsageError(f"{kind}: {count:,} poses asked for, more than {MAX_POSES:,}")
-    for name, (start, stop) in zip(ANGLES, ranges, strict=True):
-        _check_range(name, start, stop)
+    for name, axis in zip(ANGLES, ranges, strict=True):
+        if len(axis) != 2:
+            raise UsageError(f"poses.{name}: a {kind} plan takes low and high, got {list(axis)}")
+        _check_range(name, *axis)
     low, high = np.array(ranges, dtype=np.float64).T
     distinct = math.prod(int(n) + 1 for n in np.floor((high - low) * 10**DRAWN_DECIMALS))
     if count > max(distinct // 2, 1):  # close to all of them, drawing would take forever

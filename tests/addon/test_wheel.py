@@ -15,13 +15,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from generator.plan.render_settings import RenderSettings
 from placed_head import PlacedHead
 from real_blender import ROOT
 
 from generator.execution.lanes.lines import LineProcess
 from generator.heads.package import save_package
 from generator.plan.config import BuildConfig, config_toml, load_config
-from generator.plan.render_settings import RenderSettings
 
 OTHERS = [name for name in os.environ.get("HEADTURN_BPY_PYTHONS", "").split(":") if name]
 FULL = {

@@ -23,7 +23,8 @@ from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angl
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.package import save_package
 from generator.landmarks.surface import Surface
-from generator.plan.render_settings import RenderSettings
+from generator.plan.settings import Look
+from generator.plan.views import Views
 
 SIDE = 80.0
 POSES = np.array([[0.0, 0, 0], [30, 20, 10], [-50, 40, 30], [25, -35, -20]])
@@ -60,15 +61,16 @@ def on_the_box(rng: np.random.Generator, count: int) -> np.ndarray:
     return points @ CAMERA_FROM_GRAPHICS
 
 
+def views_of(camera: Camera, poses: np.ndarray) -> Views:
+    return Views(tuple(map(tuple, poses.tolist())), (camera,), (Look(),))
+
+
 def shoot(
     renderer: Renderer, folder: Path, camera: Camera, poses: np.ndarray = POSES
 ) -> list[dict[str, np.ndarray]]:
     """Every pass of the cube at each pose."""
-    settings = RenderSettings(
-        resolution=camera.resolution, lens_mm=camera.lens_mm, projection=camera.projection
-    )
     save_package(box(), folder / "box.npz")
-    paths = renderer.render(folder / "box.npz", settings, camera.distance_mm, poses.tolist(), passes=PASSES)
+    paths = renderer.render(folder / "box.npz", views_of(camera, poses), passes=PASSES)
     return [passes_from_blender(path, PASSES, camera.distance_mm) for path in paths]
 
 
@@ -103,11 +105,11 @@ def test_points_of_a_cube_are_where_k_says(
     renderer: Renderer, tmp_path: Path, lens: float, projection: Projection
 ) -> None:
     distance = framing_distance(SIDE * 0.87, lens, 1.05, projection)
-    camera = Camera(128, lens, round(distance, 2), projection)
+    camera = Camera.square(128, lens, round(distance, 2), projection)
     points = on_the_box(np.random.default_rng(3), 60)
     rotations = rotation_from_angles(POSES)
     surface = Surface(box())
-    visible = surface.visible(points, rotations, camera)
+    visible = surface.visible(points, views_of(camera, POSES))
     compared = 0
     centres = np.stack(np.meshgrid(np.arange(128) + 0.5, np.arange(128) + 0.5), axis=-1)
     for channels, rotation, seen in zip(shoot(renderer, tmp_path, camera), rotations, visible, strict=True):
@@ -136,7 +138,7 @@ def test_points_of_a_cube_are_where_k_says(
 
 
 def test_uv_index_and_nothing(renderer: Renderer, tmp_path: Path) -> None:
-    camera = Camera(64, 85.0, 400.0)
+    camera = Camera.square(64, 85.0, 400.0)
     [front] = shoot(renderer, tmp_path, camera, POSES[:1])
     assert set(front) == {
         *("depth.Z", "normal.X", "normal.Y", "normal.Z", "position.X", "position.Y", "position.Z"),
@@ -156,7 +158,7 @@ def test_uv_index_and_nothing(renderer: Renderer, tmp_path: Path) -> None:
 
 
 def test_files_are_the_same_bytes_and_read_by_any_reader(renderer: Renderer, tmp_path: Path) -> None:
-    camera = Camera(32, 85.0, 400.0)
+    camera = Camera.square(32, 85.0, 400.0)
     one, two = (shoot(renderer, tmp_path, camera, POSES[1:2])[0] for _ in range(2))
     assert passes_sha256(one) == passes_sha256(two)
     for name, channels in (("a", one), ("b", two)):
@@ -172,19 +174,18 @@ def test_files_are_the_same_bytes_and_read_by_any_reader(renderer: Renderer, tmp
 
 
 def test_pictures_and_passes_do_not_disturb_each_other(renderer: Renderer, tmp_path: Path) -> None:
-    package, poses = tmp_path / "box.npz", POSES[1:2].tolist()
-    camera = Camera(64, 85.0, 400.0)
+    package, camera = tmp_path / "box.npz", Camera.square(64, 85.0, 400.0)
+    views = views_of(camera, POSES[1:2])
     [alone] = shoot(renderer, tmp_path, camera, POSES[1:2])
-    settings = RenderSettings(resolution=64)
     save_package(box(), package)  # a new file: the scene is built anew, and a picture comes first
 
     def picture() -> bytes:
-        [path] = renderer.render(package, settings, 400.0, poses)
+        [path] = renderer.render(package, views)
         return path.read_bytes()
 
     before = picture()
     for _ in range(2):
-        [path] = renderer.render(package, settings, 400.0, poses, passes=PASSES)
+        [path] = renderer.render(package, views, passes=PASSES)
         assert passes_sha256(passes_from_blender(path, PASSES, 400.0)) == passes_sha256(alone)
         assert picture() == before
 

@@ -14,16 +14,18 @@ from placed_head import PlacedHead
 
 from generator.errors import HeadError
 from generator.execution.lanes.renderer import Renderer
-from generator.geometry.camera import Camera, framing_distance
+from generator.geometry.camera import Camera
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.package import save_package
 from generator.plan.poses import grid_plan
-from generator.plan.render_settings import RenderSettings
+from generator.plan.settings import Look, Render
+from generator.plan.views import View, Views, framed_camera
 
-FLAT = RenderSettings(resolution=128, ambient=1.0, samples=4)
+FLAT = Look(ambient=1.0, samples=4)
 MARKS = {"nose": ((0, 0, 70), (1, 0, 0)), "crown": ((0, 70, 0), (0, 1, 0)), "left": ((70, 0, 0), (0, 0, 1))}
 DISTANCE = 700.0
+CAMERA = Camera.square(128, 85.0, DISTANCE)
 
 
 def sphere(centre: tuple, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -68,14 +70,14 @@ def marked_ball() -> HeadMesh:
 
 
 def shoot(
-    renderer: Renderer, mesh: HeadMesh, folder: Path, poses: list, settings: RenderSettings = FLAT
+    renderer: Renderer, mesh: HeadMesh, folder: Path, poses: list, look: Look = FLAT, camera: Camera = CAMERA
 ) -> list[np.ndarray]:
     """RGB images, uint8."""
     package = folder / "head.npz"
     save_package(mesh, package)
     return [
         cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
-        for path in renderer.render(package, settings, DISTANCE, poses)
+        for path in renderer.render(package, Views(tuple(map(tuple, poses)), (camera,), (look,)))
     ]
 
 
@@ -107,7 +109,7 @@ def test_every_mark_is_where_the_labels_say(
 ) -> None:
     """Pixel centroids against K (R_C p + t): lens, distance, rotation and frames at once."""
     poses = np.random.default_rng(5).uniform([-50, -40, -30], [50, 40, 30], (6, 3))
-    camera = Camera(FLAT.resolution, FLAT.lens_mm, DISTANCE)
+    camera = CAMERA
     checked = 0
     for pose, image in zip(poses, shoot(renderer, marked_ball, tmp_path, poses.tolist()), strict=True):
         for channel, (centre, _) in enumerate(MARKS.values()):
@@ -162,7 +164,7 @@ def test_texture_vertex_colours_and_holes(renderer: Renderer, tmp_path: Path) ->
         (Material("t", (1, 1, 1), tmp_path / "t.png", True),),
     )
     [image] = shoot(renderer, square, tmp_path, [[0, 0, 0]])
-    camera = Camera(FLAT.resolution, FLAT.lens_mm, DISTANCE)
+    camera = CAMERA
 
     def at(x: float, y: float) -> np.ndarray:
         column, row = camera.project(np.array([x, -y, DISTANCE]))
@@ -179,17 +181,15 @@ def test_texture_vertex_colours_and_holes(renderer: Renderer, tmp_path: Path) ->
 
 
 def test_every_pose_of_the_grid_stays_inside(placed_head: PlacedHead) -> None:
-    settings = RenderSettings()
-    distance = framing_distance(placed_head.prepared.radius_mm, settings.lens_mm, settings.margin)
-    camera = Camera(settings.resolution, settings.lens_mm, distance)
+    camera = framed_camera(Render(), placed_head.placement.radius_mm)
     reach = np.linalg.norm(placed_head.mesh.vertices, axis=1)
-    head = placed_head.mesh.vertices[reach <= placed_head.prepared.radius_mm]
+    head = placed_head.mesh.vertices[reach <= placed_head.placement.radius_mm]
     assert len(head) > 0.7 * len(reach), "the sphere holds the head, not a part of it"
     rotations = rotation_from_angles(grid_plan().angles_deg)
     for rotation in rotations:
         pixels = camera.project(head @ (rotation @ CAMERA_FROM_GRAPHICS).T + camera.translation_mm)
         assert pixels.min() >= 0
-        assert pixels.max() <= settings.resolution
+        assert pixels.max() <= camera.width
 
 
 def floats(path: Path) -> np.ndarray:
@@ -203,14 +203,15 @@ def test_floats_are_equal_across_processes_and_threads(
 ) -> None:
     package = tmp_path / "head.npz"
     save_package(placed_head.mesh, package)
-    settings = RenderSettings(resolution=64, preset=preset, samples=2)
+    camera, look = Camera.square(64, 85.0, DISTANCE), Look(preset=preset, samples=2)
     poses = [[0, 0, 0], [35, -20, 10], [-50, 40, 30]]
     seen = []
     for threads, order in ((1, poses), (2, poses[::-1])):
         folder = tmp_path / f"threads{threads}"
         folder.mkdir()
         worker = Renderer(folder, tmp_path / "log", threads=threads)
-        frames = [floats(p) for p in worker.render(package, settings, DISTANCE, order, frame_format="exr")]
+        views = Views(tuple(map(tuple, order)), (camera,), (look,))
+        frames = [floats(p) for p in worker.render(package, views, kind="exr")]
         worker.close()
         seen.append(frames if order is poses else frames[::-1])
     for a, b in zip(*seen, strict=True):
@@ -235,7 +236,7 @@ def test_a_broken_package_is_an_error_and_the_worker_goes_on(
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"not a package")
     with pytest.raises(HeadError, match="Blender"):
-        list(renderer.render(bad, FLAT, DISTANCE, [[0, 0, 0]]))
+        list(renderer.render(bad, Views.of([View((0, 0, 0), CAMERA, FLAT)])))
     assert shoot(renderer, marked_ball, tmp_path, [[0, 0, 0]])
 
 

@@ -14,7 +14,6 @@ from generator.dataset.format.anchors_table import HeadAnchors, write_anchors
 from generator.dataset.format.heads_table import HeadRow, write_heads
 from generator.dataset.format.manifest import (
     Manifest,
-    common_configuration,
     configuration_digest,
     write_manifest,
 )
@@ -23,10 +22,12 @@ from generator.dataset.format.schema import ImageMode, part_schema
 from generator.dataset.show.card import write_card
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import rotation_from_angles
-from generator.plan.poses import PosePlan, grid_plan, write_poses_csv
+from generator.plan.first_settings import common_values
+from generator.plan.pose_plans import PosePlans, poses_csv
+from generator.plan.poses import PosePlan, grid_plan
 
 VERSIONS = {"headturn": "0.0.0", "numpy": np.__version__}
-CAMERA = Camera(resolution=64, lens_mm=85.0, distance_mm=700.0)
+CAMERA = Camera.square(64, lens_mm=85.0, distance_mm=700.0)
 SMALL_PLAN = grid_plan((-30, 30, 30), (-20, 20, 20), (0, 10, 10))
 
 
@@ -57,14 +58,14 @@ def face_visible(rotations: np.ndarray, camera: Camera) -> np.ndarray:
 def draw_face(rotation: np.ndarray, camera: Camera, tone: tuple[int, int, int]) -> bytes:
     """PNG of eyes, nose and mouth on an oval, at their places in the pose."""
     points = {"eye": (-30, -20, -65), "eye2": (30, -20, -65), "nose": (0, 10, -90), "mouth": (0, 45, -65)}
-    image = Image.new("RGB", (camera.resolution, camera.resolution), (128, 128, 128))
+    image = Image.new("RGB", (camera.width, camera.height), (128, 128, 128))
     draw = ImageDraw.Draw(image)
     outline = camera.project(face_points() * 1.1 @ rotation.T + camera.translation_mm)
     (left, top), (right, bottom) = outline.min(axis=0), outline.max(axis=0)
     draw.ellipse((left, top, right, bottom), fill=tone)
     for name, point in points.items():
         x, y = camera.project(rotation @ np.array(point, float) + camera.translation_mm)
-        r = camera.resolution / 40
+        r = camera.width / 40
         draw.ellipse((x - r, y - r, x + r, y + r), fill=(40, 20, 20) if "eye" in name else (200, 90, 90))
     file = io.BytesIO()
     image.save(file, "PNG")
@@ -91,7 +92,7 @@ def unit_rows(head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAM
         redistributable=head.redistributable,
         angles_deg=angles,
         indices=plan.indices[chosen],
-        camera=camera,
+        cameras=(camera,),
         detected=detected,
         landmarks=landmarks,
         anchors=face_anchors(),
@@ -144,7 +145,7 @@ def build_dataset(
 ) -> Manifest:
     """A finished dataset of heads x plan, a part for every chunk of poses."""
     configuration = {"poses": plan.kind, "images": images}
-    schema = part_schema(images, VERSIONS, configuration_digest(common_configuration(configuration)))
+    schema = part_schema(images, VERSIONS, configuration_digest(common_values(configuration)))
     root.mkdir(parents=True)
     parts = []
     for head in heads:
@@ -158,7 +159,7 @@ def build_dataset(
     write_anchors(
         [HeadAnchors(h.subject, h.expression, triangles, weights, face_anchors()) for h in heads], root
     )
-    write_poses_csv(plan, root / "poses.csv")
+    (root / "poses.csv").write_text(poses_csv(PosePlans(plan)))
     manifest = Manifest(
         VERSIONS, configuration, tuple(parts), images, len(heads), created_by="headturn build"
     )

@@ -124,7 +124,7 @@ def test_300w_lp_read_by_scipy(source, rows, tmp_path, landmarks):
 
 def test_300w_lp_of_an_orthographic_camera_is_weak_perspective_itself(tmp_path, build):
     sio = pytest.importorskip("scipy.io")
-    build(tmp_path / "d", camera=Camera(64, 85.0, 700.0, "orthographic"))
+    build(tmp_path / "d", camera=Camera.square(64, 85.0, 700.0, "orthographic"))
     export_dataset(tmp_path / "d", "300w-lp", tmp_path / "out")
     rows = {row["sample_id"]: row for row in pq.read_table(tmp_path / "d" / "data").to_pylist()}
     row = rows["s1/neutral/y-30_p+20_r+10"]

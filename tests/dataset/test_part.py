@@ -34,11 +34,11 @@ def test_table_holds_what_the_unit_gave(rows):
     np.testing.assert_array_equal(as_array(table, "quaternion"), quaternion_from_rotation(rotation))
     np.testing.assert_array_equal(as_array(table, "landmarks"), rows.landmarks)
     exact = as_array(table, "landmarks_exact").astype(float)
-    anchored = exact[3] - rows.camera.translation_mm  # back to pose zero: x R is the inverse of R x
+    anchored = exact[3] - rows.cameras[0].translation_mm  # back to pose zero: x R is the inverse of R x
     np.testing.assert_allclose(anchored @ rotation[3], rows.anchors, atol=1e-4)
     np.testing.assert_array_equal(np.isnan(exact).any(axis=(0, 2)), np.isnan(rows.anchors).any(axis=1))
     np.testing.assert_array_equal(as_array(table, "landmarks_visible"), rows.visible)
-    np.testing.assert_array_equal(as_array(table, "camera")[3].reshape(3, 3), rows.camera.matrix)
+    np.testing.assert_array_equal(as_array(table, "camera")[3].reshape(3, 3), rows.cameras[0].matrix)
     assert table["sample_id"][0].as_py() == "s1/neutral/y-30_p-20_r+0"
     assert table["image_sha256"].to_pylist() == [hashlib.sha256(i).hexdigest() for i in rows.images]
     assert set(table["image_path"].to_pylist()) == {""}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from generator.plan.render_settings import RenderSettings
 
 from downstream_hpe.metrics import euler_errors
 from downstream_hpe.pictures import read_bgr
@@ -15,7 +16,6 @@ from generator.geometry.rotation import rotation_from_angles
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
 from generator.placing.anchoring import anchor_head, level_head
-from generator.plan.render_settings import RenderSettings
 
 pytest.importorskip("onnxruntime")
 
@@ -32,8 +32,8 @@ def seen(placed_head, renderer, detector, tmp_path_factory):
     """Landmarks of a parametric head of another seed than the training's, and its canonical R_C."""
     folder = tmp_path_factory.mktemp("seen")
     mesh = read_mesh(placed_head.head, folder)
-    _, levelling = anchor_head(mesh, placed_head.prepared, renderer, detector, folder)
-    level = level_head(placed_head.head, placed_head.prepared, levelling, "canonical")
+    _, levelling = anchor_head(mesh, placed_head.placement, renderer, detector, folder)
+    level = level_head(placed_head.head, placed_head.placement, levelling, "canonical")
     package = folder / "head.npz"
     save_package(level.normalise(mesh), package)
     settings = RenderSettings(resolution=256, lens_mm=60.0)

@@ -15,7 +15,8 @@ from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError
 from generator.execution.build.chunks import Earlier, assign_chunks, cut
 from generator.plan.config import BuildConfig
-from generator.plan.poses import csv_plan, grid_plan, poses_csv, uniform_plan
+from generator.plan.pose_plans import PosePlans, poses_csv, read_pose_plans
+from generator.plan.poses import csv_plan, grid_plan, uniform_plan
 
 Built = tuple[BuildConfig, Path]
 
@@ -74,20 +75,23 @@ def test_chunks_stay_together_when_a_plan_grows(tmp_path: Path) -> None:
         plan = uniform_plan(count, 3)
         numbers = assign_chunks(plan, 8, earlier)
         chunks = cut(plan, numbers, earlier)
-        assert sorted(pose for chunk in chunks for pose in chunk.poses) == plan.angles_deg.tolist()
+        built = sorted(pose for chunk in chunks for pose in chunk.poses)
+        assert built == [*map(tuple, plan.angles_deg.tolist())]
         assert all(1 <= len(chunk.poses) <= 8 for chunk in chunks)
         assert all(chunk.earlier_indices is None for chunk in chunks), "off the grid nothing moves"
         now = {frozenset(map(tuple, chunk.poses)) for chunk in chunks}
         assert seen <= now
         seen = now
         poses = [tuple(pose) for pose in plan.angles_deg.tolist()]
-        off_grid = {pose: [-1, -1, -1] for pose in poses}
+        off_grid = dict.fromkeys(poses, (-1, -1, -1))
         earlier = Earlier(dict(zip(poses, numbers.tolist(), strict=True)), off_grid)
 
 
 def test_poses_csv_keeps_its_chunks_to_itself(tmp_path: Path) -> None:
     plan = grid_plan()
-    (tmp_path / "poses.csv").write_text(poses_csv(plan, np.arange(len(plan)) // 100))
+    chunks = np.arange(len(plan)) // 100
+    (tmp_path / "poses.csv").write_text(poses_csv(PosePlans(plan, {}, {None: chunks})))
+    assert np.array_equal(read_pose_plans(tmp_path / "poses.csv").chunks[None], chunks)
     again = csv_plan(tmp_path / "poses.csv")
     assert np.array_equal(again.angles_deg, plan.angles_deg)
     assert np.array_equal(again.indices, plan.indices)

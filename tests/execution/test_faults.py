@@ -23,7 +23,7 @@ from generator.dataset.proof.verify import verify_dataset
 from generator.errors import DatasetError
 from generator.execution.build.folder import CONFIG_FILE
 from generator.execution.build.lock import LOCK_FILE
-from generator.execution.build.prepared_heads import PREPARED_FILE
+from generator.execution.build.placed_heads import PLACED_FILE
 from generator.execution.stopping import Stopped, stoppable
 from generator.plan.config import BuildConfig
 
@@ -45,7 +45,7 @@ def leftovers(of: Host) -> list[str]:
 def looked_at(built: Built, root: Path) -> Path:
     """A folder where the heads were prepared and nothing was rendered yet: what follows is quick."""
     root.mkdir()
-    for name in (CONFIG_FILE, PREPARED_FILE):
+    for name in (CONFIG_FILE, PLACED_FILE):
         shutil.copy(built[1] / name, root)
     return root
 

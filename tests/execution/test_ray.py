@@ -17,7 +17,7 @@ from generator.dataset.format.manifest import read_manifest
 from generator.dataset.proof.verify import verify_dataset
 from generator.errors import UsageError
 from generator.execution.build.folder import CONFIG_FILE
-from generator.execution.build.prepared_heads import PREPARED_FILE
+from generator.execution.build.placed_heads import PLACED_FILE
 from generator.execution.build.run import build
 from generator.execution.executors.open import open_executor
 from generator.plan.config import BuildConfig
@@ -42,7 +42,7 @@ def test_ray_builds_the_same_dataset_and_survives_a_killed_actor(
 ) -> None:
     root = tmp_path / "d"
     root.mkdir()
-    for name in (CONFIG_FILE, PREPARED_FILE):
+    for name in (CONFIG_FILE, PLACED_FILE):
         shutil.copy(built[1] / name, root)
     reporter = Quiet()
     killed: list[int] = []

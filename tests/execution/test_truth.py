@@ -33,10 +33,10 @@ from generator.geometry.rotation import (
     graphics_rotation,
     rotation_from_angles,
 )
+from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.placing.anchoring import level_head
-from generator.placing.face import Prepared
 from generator.plan.config import load_config
 
 POSES = {"yaw": [-40, 40, 40], "pitch": [-20, 20, 40], "roll": [0, 20, 20]}
@@ -185,10 +185,10 @@ def test_each_frame_is_derived_from_the_other(truth: Path, one_head: Path, tmp_p
 
 def test_a_head_that_cannot_be_levelled_is_refused_in_one_line(one_head: Path) -> None:
     head = find_heads(one_head).heads[0]
-    prepared = Prepared("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 150.0, 90.0)
-    assert level_head(head, prepared, None, "source").frame == "source"
+    placement = Placement("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 150.0, 90.0)
+    assert level_head(head, placement, None, "source").frame == "source"
     with pytest.raises(HeadError, match=r"neutral\.obj: cannot be levelled: too few landmarks") as error:
-        level_head(head, prepared, None, "canonical")
+        level_head(head, placement, None, "canonical")
     assert "\n" not in str(error.value)
 
 

@@ -13,7 +13,7 @@ from generator.geometry.rotation import rotation_from_angles
 
 
 def test_rays_invert_projection() -> None:
-    camera = Camera(256, 85.0, 700.0)
+    camera = Camera.square(256, 85.0, 700.0)
     points = np.random.default_rng(0).uniform(-80, 80, (50, 3)) + camera.translation_mm
     origins, rays = camera.rays(camera.project(points))
     assert not origins.any()
@@ -21,7 +21,7 @@ def test_rays_invert_projection() -> None:
 
 
 def test_orthographic_rays_are_parallel_and_agree_with_perspective_at_the_pivot() -> None:
-    flat, deep = Camera(256, 85.0, 700.0, "orthographic"), Camera(256, 85.0, 700.0)
+    flat, deep = Camera.square(256, 85.0, 700.0, "orthographic"), Camera.square(256, 85.0, 700.0)
     points = np.random.default_rng(0).uniform(-80, 80, (50, 3)) + flat.translation_mm
     origins, rays = flat.rays(flat.project(points))
     assert np.allclose(rays, [0, 0, 1])
@@ -37,7 +37,7 @@ def test_orthographic_rays_are_parallel_and_agree_with_perspective_at_the_pivot(
 
 
 def test_the_pivot_is_the_centre_of_the_image() -> None:
-    camera = Camera(200, 50.0, 400.0)
+    camera = Camera.square(200, 50.0, 400.0)
     assert np.allclose(camera.project(camera.translation_mm), [100, 100])
 
 
@@ -46,7 +46,7 @@ def test_the_pivot_is_the_centre_of_the_image() -> None:
 def test_a_framed_sphere_stays_inside(lens: float, projection: Projection) -> None:
     radius, directions = 140.0, np.random.default_rng(1).normal(size=(20_000, 3))
     sphere = radius * directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    camera = Camera(256, lens, framing_distance(radius, lens, 1.0, projection), projection)
+    camera = Camera.square(256, lens, framing_distance(radius, lens, 1.0, projection), projection)
     pixels = camera.project(sphere + camera.translation_mm)
     assert pixels.min() > 0
     assert pixels.max() < 256

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from generator.codec import from_plain, to_plain
 from generator.errors import HeadError
 from generator.geometry.camera import Camera
 from generator.geometry.raycast import first_hits
@@ -21,16 +22,19 @@ from generator.geometry.rotation import (
     rotation_from_angles,
 )
 from generator.heads.mesh import HeadMesh, Material
-from generator.landmarks.anchors import Anchors, View, find_anchors, no_anchors, pack, unpack
+from generator.landmarks.anchors import Anchors, no_anchors
 from generator.landmarks.reference_face import mirror_pairs, surface_face
 from generator.landmarks.surface import TOLERANCE_MM, Surface
+from generator.placing.anchors import Sighting, find_anchors
 from generator.placing.levelling import SHAPE_SD_DEG, level
+from generator.plan.settings import Look
+from generator.plan.views import Views
 
 RADII = np.array([70.0, 100.0, 80.0])
 SIDE = 454
 """The point farthest to the subject's left."""
 
-CAMERA = Camera(384, 200.0, 1500.0)
+CAMERA = Camera.square(384, 200.0, 1500.0)
 ANGLES = [(0, 0, 0), (10, 0, 0), (-10, 0, 0), (0, 8, 0), (0, -8, 0), (6, 5, 5), (-6, 5, -5)]
 
 
@@ -53,12 +57,16 @@ def truth(ellipsoid: HeadMesh) -> np.ndarray:
     return hits @ CAMERA_FROM_GRAPHICS
 
 
-def views_of(points: np.ndarray, noise_px: float, rng: np.random.Generator) -> list[View]:
+def seen_at(angles: list, camera: Camera) -> Views:
+    return Views(tuple(map(tuple, angles)), (camera,), (Look(),))
+
+
+def views_of(points: np.ndarray, noise_px: float, rng: np.random.Generator) -> list[Sighting]:
     views = []
     for angles in ANGLES:
         rotation = rotation_from_angles(np.array(angles, float))
         pixels = CAMERA.project(points @ rotation.T + CAMERA.translation_mm)
-        views.append(View(rotation, pixels + rng.normal(0, noise_px, pixels.shape)))
+        views.append(Sighting(rotation, pixels + rng.normal(0, noise_px, pixels.shape)))
     return views
 
 
@@ -83,14 +91,14 @@ def test_anchors_are_exact_without_noise_and_average_it_away(ellipsoid: HeadMesh
     rng = np.random.default_rng(2)
     clean = find_anchors(surface, views_of(truth, 0.0, rng), CAMERA)
     assert (clean.views, clean.off, clean.absent) == (7, 0, 0)
-    always = surface.visible(truth, rotation_from_angles(np.array(ANGLES, float)), CAMERA).all(axis=0)
+    always = surface.visible(truth, seen_at(ANGLES, CAMERA)).all(axis=0)
     assert always.sum() > 400
     assert np.linalg.norm(clean.points - truth, axis=1)[always].max() < 0.02
     assert clean.residual_px < 0.1
     np.testing.assert_allclose(surface.points(clean.triangles, clean.weights), clean.points)
 
     noisy = find_anchors(surface, views_of(truth, 1.0, rng), CAMERA)
-    mm_per_px = CAMERA.view_mm / CAMERA.resolution
+    mm_per_px = CAMERA.view_mm / CAMERA.width
     sideways = (noisy.points - truth)[:, :2] / mm_per_px
     assert np.sqrt((sideways**2).mean()) < 0.6, "seven views: 1 / sqrt(7) = 0.38 px, and a robust mean"
     assert noisy.residual_px == pytest.approx(np.sqrt(2), rel=0.15)
@@ -110,7 +118,7 @@ def test_points_beside_the_silhouette_are_counted_and_too_far_ones_absent(
     assert anchors.triangles[6] == -1
     assert anchors.problems == ["1 landmarks have no place on the mesh: NaN"]
     assert no_anchors().problems == ["no face was found near the front: landmarks_exact is NaN"]
-    back = Anchors.from_dict(anchors.as_dict())
+    back = from_plain(Anchors, to_plain(anchors))
     np.testing.assert_array_equal(back.points, anchors.points)
     np.testing.assert_array_equal(back.triangles, anchors.triangles)
     # Hair: a large triangle behind the face, which is what a ray meets that passes the jaw.
@@ -125,15 +133,15 @@ def test_points_beside_the_silhouette_are_counted_and_too_far_ones_absent(
     behind = find_anchors(Surface(wall), views, CAMERA)
     assert (behind.off, behind.absent) == (1, 0)
     assert np.linalg.norm(behind.points[SIDE] - truth[SIDE]) < 20, "back on the face, and counted"
-
-    np.testing.assert_array_equal(unpack(pack(anchors.weights, "<f8"), "<f8"), anchors.weights.reshape(-1))
+    np.testing.assert_array_equal(back.weights, anchors.weights)
 
 
 def test_visible_is_what_faces_the_camera_on_a_convex_body(ellipsoid: HeadMesh, truth: np.ndarray) -> None:
     surface = Surface(ellipsoid)
-    rotations = rotation_from_angles(np.random.default_rng(4).uniform(-180, 180, (40, 3)))
-    for camera in (CAMERA, Camera(128, 35.0, 500.0), replace(CAMERA, projection="orthographic")):
-        visible = surface.visible(truth, rotations, camera)
+    angles = np.random.default_rng(4).uniform(-180, 180, (40, 3))
+    rotations = rotation_from_angles(angles)
+    for camera in (CAMERA, Camera.square(128, 35.0, 500.0), replace(CAMERA, projection="orthographic")):
+        visible = surface.visible(truth, seen_at(angles.tolist(), camera))
         posed = truth @ np.swapaxes(rotations, 1, 2) + camera.translation_mm
         normals = (truth / (RADII**2)) @ np.swapaxes(rotations, 1, 2)
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
@@ -145,13 +153,13 @@ def test_visible_is_what_faces_the_camera_on_a_convex_body(ellipsoid: HeadMesh, 
 
 
 def test_outside_the_image_nothing_is_visible(ellipsoid: HeadMesh, truth: np.ndarray) -> None:
-    near = Camera(128, 200.0, 500.0)
-    visible = Surface(ellipsoid).visible(truth, np.eye(3)[None], near)[0]
+    near = Camera.square(128, 200.0, 500.0)
+    visible = Surface(ellipsoid).visible(truth, seen_at([(0, 0, 0)], near))[0]
     pixels = near.project(truth + near.translation_mm)
     inside = ((pixels >= 0) & (pixels <= 128)).all(axis=1)
     assert not visible[~inside].any()
     assert 0 < visible.sum() < 468
-    assert not Surface(ellipsoid).visible(np.full((468, 3), np.nan), np.eye(3)[None], near).any()
+    assert not Surface(ellipsoid).visible(np.full((468, 3), np.nan), seen_at([(0, 0, 0)], near)).any()
 
 
 def test_rays_go_through_holes(tmp_path: Path) -> None:
@@ -172,7 +180,7 @@ def test_rays_go_through_holes(tmp_path: Path) -> None:
     )
     surface = Surface(mesh)
     wall = np.array([[-25.0, 5, 0], [25.0, 5, 0]])
-    assert surface.visible(wall, np.eye(3)[None], CAMERA).tolist() == [[True, False]]
+    assert surface.visible(wall, seen_at([(0, 0, 0)], CAMERA)).tolist() == [[True, False]]
     hits = surface.first_hits(np.array([[-25.0, 5, -400], [25.0, 5, -400]]), np.tile([0, 0, 1.0], (2, 1)))
     np.testing.assert_allclose(hits.points[:, 2], [0, -20], atol=1e-4)
     assert TOLERANCE_MM < 1

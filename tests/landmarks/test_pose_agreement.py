@@ -5,14 +5,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from placed_head import PlacedHead
 from scipy.spatial.transform import Rotation
 
 from generator.execution.lanes.renderer import Renderer
-from generator.geometry.camera import framing_distance
 from generator.geometry.rotation import geodesic_deg, rotation_from_angles
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
@@ -20,8 +18,10 @@ from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.landmarks.reference_face import fit_pose, reference_face
-from generator.placing.face import prepare
-from generator.plan.render_settings import RenderSettings
+from generator.placing.face import find_face
+from generator.placing.rendering import read_image
+from generator.plan.settings import Render
+from generator.plan.views import plan_views
 
 POSES = np.array(
     [
@@ -37,7 +37,7 @@ POSES = np.array(
     ],
     dtype=float,
 )
-LOOK = RenderSettings(resolution=256, lens_mm=135.0, samples=2)
+LOOK = Render(resolution=256, lens_mm=135.0, samples=2)
 
 
 def disagreement(
@@ -46,10 +46,10 @@ def disagreement(
     """Geodesic degrees between label and detector, the head's one constant offset taken out."""
     package = folder / "head.npz"
     save_package(mesh, package)
-    distance = framing_distance(radius_mm, LOOK.lens_mm, LOOK.margin)
+    views = plan_views(LOOK, radius_mm, [tuple(pose) for pose in POSES.tolist()])
     labels, seen = [], []
-    for pose, path in zip(POSES, renderer.render(package, LOOK, distance, POSES.tolist()), strict=True):
-        found = detector.detect(cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+    for pose, path in zip(POSES, renderer.render(package, views), strict=True):
+        found = detector.detect(read_image(path))
         assert found is not None, f"no face at {pose}"
         labels.append(rotation_from_angles(pose))
         seen.append(fit_pose(found).rotation)
@@ -61,7 +61,7 @@ def disagreement(
 def test_on_a_parametric_head(
     placed_head: PlacedHead, renderer: Renderer, detector: MediaPipeFaceMesh, tmp_path: Path
 ) -> None:
-    error = disagreement(placed_head.mesh, placed_head.prepared.radius_mm, renderer, detector, tmp_path)
+    error = disagreement(placed_head.mesh, placed_head.placement.radius_mm, renderer, detector, tmp_path)
     assert np.median(error) < 5
     assert error.max() < 10
 
@@ -72,8 +72,8 @@ def test_on_real_heads(
 ) -> None:
     [head] = find_heads(shared_heads / name).heads
     mesh = read_mesh(head, tmp_path)
-    prepared = prepare(head, mesh, renderer, detector, tmp_path)
-    error = disagreement(prepared.normalise(mesh), prepared.radius_mm, renderer, detector, tmp_path)
+    placement = find_face(head, mesh, renderer, detector, tmp_path)
+    error = disagreement(placement.normalise(mesh), placement.radius_mm, renderer, detector, tmp_path)
     assert np.median(error) < 5
     assert error.max() < 10
 
@@ -84,9 +84,8 @@ def test_landmarks_are_isotropic_pixels(
     """x and y lie on the face in the image, z shrinks towards the camera at the nose."""
     package = tmp_path / "head.npz"
     save_package(placed_head.mesh, package)
-    distance = framing_distance(placed_head.prepared.radius_mm, LOOK.lens_mm, LOOK.margin)
-    [path] = renderer.render(package, LOOK, distance, [[0, 0, 0]])
-    found = detector.detect(cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+    [path] = renderer.render(package, plan_views(LOOK, placed_head.placement.radius_mm, [(0, 0, 0)]))
+    found = detector.detect(read_image(path))
     assert found.shape == (468, 3)
     assert found.dtype == np.float32
     assert 60 < found[:, :2].mean() < 200

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from generator.errors import UsageError
-from generator.plan.poses import csv_plan, grid_plan, pose_name, sobol_plan, uniform_plan, write_poses_csv
+from generator.plan.pose_plans import PosePlans, poses_csv
+from generator.plan.poses import csv_plan, grid_plan, pose_name, sobol_plan, uniform_plan
 
 
 def test_default_grid_is_the_reference_grid():
@@ -78,7 +79,7 @@ def test_random_plans_refuse(draw):
 
 @pytest.mark.parametrize("plan", [grid_plan(), uniform_plan(200, 3)], ids=["grid", "uniform"])
 def test_csv_round_trip_is_exact(tmp_path, plan):
-    write_poses_csv(plan, tmp_path / "poses.csv")
+    (tmp_path / "poses.csv").write_text(poses_csv(PosePlans(plan)))
     again = csv_plan(tmp_path / "poses.csv")
     assert again.angles_deg.tobytes() == plan.angles_deg.tobytes()
     assert again.indices.tobytes() == plan.indices.tobytes()
@@ -88,7 +89,7 @@ def test_csv_keeps_the_last_digit(tmp_path):
     (tmp_path / "a.csv").write_text("yaw,pitch,roll\n0.30000000000000004,33.333333333333336,1e-300\n")
     plan = csv_plan(tmp_path / "a.csv")
     assert plan.angles_deg.tolist() == [[0.1 + 0.2, 100 / 3, 1e-300]]
-    write_poses_csv(plan, tmp_path / "b.csv")
+    (tmp_path / "b.csv").write_text(poses_csv(PosePlans(plan)))
     assert csv_plan(tmp_path / "b.csv").angles_deg.tobytes() == plan.angles_deg.tobytes()
 
 

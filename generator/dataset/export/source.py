@@ -17,7 +17,7 @@ from generator.dataset.export.sample import Sample, exact_pixels, suffix_of
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import as_array, image_bytes, read_rows
-from generator.dataset.format.part import PartInfo
+from generator.dataset.format.part_info import PartInfo
 from generator.errors import DatasetError, UsageError
 from generator.plan.poses import ANGLES
 

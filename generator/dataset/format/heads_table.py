@@ -79,7 +79,7 @@ class HeadRow:
 
     def camera(self, resolution: int) -> Camera:
         """The camera that saw this head."""
-        return Camera(resolution, self.lens_mm, self.distance_mm, self.projection)
+        return Camera.square(resolution, self.lens_mm, self.distance_mm, self.projection)
 
 
 def _list(kind: pa.DataType, size: int = -1) -> pa.DataType:

@@ -15,12 +15,12 @@ from generator.dataset.format.anchors_table import ANCHORS_FILE
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256, one_line, write_bytes
 from generator.dataset.format.heads_table import HEADS_FILE
-from generator.dataset.format.part import PartInfo
+from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import IMAGE_MODES, SCHEMA_VERSION, ImageMode, check_schema_version
 from generator.errors import DatasetError
+from generator.plan.pose_plans import POSES_FILE
 
 MANIFEST_FILE = "manifest.json"
-POSES_FILE = "poses.csv"
 _PART_PATH = re.compile(r"data/[\w+-][\w .+-]*/part-[\w .+-]+\.parquet")
 
 
@@ -95,11 +95,6 @@ def configuration_digest(configuration: Mapping[str, Any]) -> str:
         configuration, sort_keys=True, ensure_ascii=False, separators=(",", ":"), allow_nan=False
     )
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def common_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """What all parts of a dataset share: its configuration without heads and poses, which may grow."""
-    return {name: section for name, section in configuration.items() if name not in ("heads", "poses")}
 
 
 def portable_command(arguments: Sequence[str]) -> str:

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import file_sha256, one_line, write_atomically, write_files
+from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import (
     LANDMARK_COLUMNS,
     LANDMARKS,
@@ -62,7 +63,7 @@ class UnitRows:
     redistributable: bool
     angles_deg: np.ndarray
     indices: np.ndarray
-    camera: Camera
+    cameras: tuple[Camera, ...]
     detected: np.ndarray
     landmarks: np.ndarray
     anchors: np.ndarray
@@ -120,27 +121,8 @@ class UnitRows:
     def landmarks_exact(self) -> np.ndarray:
         """R_C X + t of the anchors X, float32 [N, 468, 3], frame C, mm."""
         rotation = rotation_from_angles(self.angles_deg)
-        points = self.anchors @ np.swapaxes(rotation, -1, -2) + self.camera.translation_mm
+        points = self.anchors @ np.swapaxes(rotation, -1, -2) + self.cameras[0].translation_mm
         return points.astype(np.float32)
-
-
-@dataclass(frozen=True)
-class PartInfo:
-    """One part as the manifest lists it.
-
-    path: relative to the dataset, with "/". bytes and sha256: of the file.
-    digest: of the content, see :mod:`generator.dataset.format.digest`.
-    subject, expression: "" where the part holds several.
-    """
-
-    path: str
-    rows: int
-    detected: int
-    bytes: int
-    sha256: str
-    digest: str
-    subject: str
-    expression: str
 
 
 def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
@@ -154,11 +136,11 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
         "split": rows.split,
         "head_license": rows.head_license,
         "redistributable": rows.redistributable,
-        "camera": rows.camera.matrix,
-        "translation_mm": rows.camera.translation_mm,
-        "projection": rows.camera.projection,
-        "width": rows.camera.resolution,
-        "height": rows.camera.resolution,
+        "camera": rows.cameras[0].matrix,
+        "translation_mm": rows.cameras[0].translation_mm,
+        "projection": rows.cameras[0].projection,
+        "width": rows.cameras[0].width,
+        "height": rows.cameras[0].height,
     }
     values: dict[str, Any] = {
         **{name: np.broadcast_to(v, (count, *np.shape(v))) for name, v in same_everywhere.items()},

@@ -82,7 +82,7 @@ def part_schema(images: ImageMode, versions: Mapping[str, str], configuration_di
     """Schema of one part: columns in order, none nullable, and the metadata.
 
     versions: name and version of every package that decides the content.
-    configuration_digest: of :func:`generator.dataset.format.manifest.common_configuration`.
+    configuration_digest: of :func:`generator.plan.first_settings.common_values`.
     """
     fields = [pa.field(name, kind, nullable=False) for name, kind in _COLUMNS]
     metadata = {
@@ -102,6 +102,12 @@ def part_schema(images: ImageMode, versions: Mapping[str, str], configuration_di
 def image_mode(schema: pa.Schema) -> str:
     """Where the images are, from the metadata :func:`part_schema` wrote."""
     return schema.metadata[b"headturn.images"].decode()
+
+
+def versions_of(schema: pa.Schema) -> dict[str, str]:
+    """Versions of everything that decided the content of a part, from its metadata."""
+    versions: dict[str, str] = json.loads((schema.metadata or {}).get(b"headturn.versions", b"{}"))
+    return versions
 
 
 def check_schema_version(version: str, where: str) -> None:

@@ -15,7 +15,7 @@ from generator.dataset.format.anchors_table import HeadAnchors
 from generator.dataset.format.digest import add_digests, content_digest
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.heads_table import HeadRow
-from generator.dataset.format.manifest import Manifest, common_configuration, configuration_digest
+from generator.dataset.format.manifest import Manifest, configuration_digest
 from generator.dataset.format.open import as_array
 from generator.dataset.format.part import PartInfo, iter_part, part_schema_of, reading
 from generator.dataset.format.schema import LANDMARK_TOPOLOGY, LANDMARKS, SCHEMA_VERSION, part_schema
@@ -31,6 +31,7 @@ from generator.dataset.proof.row_checks import (
 from generator.dataset.proof.verify_report import Check
 from generator.dataset.show.detection import Places
 from generator.errors import HeadturnError
+from generator.plan.first_settings import common_values
 from generator.plan.poses import PosePlan, pose_name
 
 
@@ -74,7 +75,7 @@ class PartChecker:
         for place, head in enumerate(heads):
             if found := anchors.get((head.subject, head.expression)):
                 self._points[place] = found.points
-        common = configuration_digest(common_configuration(manifest.configuration))
+        common = configuration_digest(common_values(manifest.configuration))
         self._schema = part_schema(manifest.images, {}, common)
         self._metadata = {
             b"headturn.schema_version": manifest.schema_version.encode(),

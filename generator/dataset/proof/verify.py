@@ -19,7 +19,7 @@ from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
 from generator.dataset.format.manifest import POSES_FILE, Manifest, read_manifest
-from generator.dataset.format.part import PartInfo
+from generator.dataset.format.part_info import PartInfo
 from generator.dataset.proof.exact_checks import anchor_problems
 from generator.dataset.proof.part_checks import PartChecker, PartFindings
 from generator.dataset.proof.verify_report import Check, VerifyReport

@@ -3,59 +3,89 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from generator.errors import DatasetError
-from generator.plan.poses import ANGLES, PosePlan
+from generator.plan.pose_plans import HeadName, PosePlans
+from generator.plan.poses import PosePlan
+from generator.plan.views import Pose
 
-CHUNK_COLUMN = "chunk"
-Pose = tuple[float, ...]
+Indices = tuple[int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Some poses of a plan, in its order; every head's units share these lists.
+    """Some poses of a plan, in its order; the units of all heads with this plan share these tuples.
 
     poses, indices: rows of the plan. earlier_indices: what the indices of the same
     poses were before the plan grew, None if nothing changed.
     """
 
-    poses: list[list[float]]
-    indices: list[list[int]]
-    earlier_indices: list[list[int]] | None = None
+    poses: tuple[Pose, ...]
+    indices: tuple[Indices, ...]
+    earlier_indices: tuple[Indices, ...] | None = None
 
 
 @dataclass(frozen=True)
 class Earlier:
-    """The poses of a dataset as they were built before. chunk, indices: of each pose."""
+    """The poses of a plan as they were built before. chunk, indices: of each pose."""
 
-    chunk: dict[Pose, int]
-    indices: dict[Pose, list[int]]
+    chunk: Mapping[Pose, int]
+    indices: Mapping[Pose, Indices]
 
 
-def read_earlier(poses_csv: Path) -> Earlier:
-    """What poses.csv of an earlier build says; nothing if there is none.
+NOTHING_EARLIER = Earlier({}, {})
 
-    Raises DatasetError if it is not such a file.
+
+@dataclass(frozen=True, eq=False)
+class ChunkedPoses:
+    """The poses of every head, cut into chunks.
+
+    plans: with the number of each pose's chunk. shared: the chunks of all heads, None where each has its
+    own, which are in by_head.
     """
-    earlier = Earlier({}, {})
-    if not poses_csv.exists():
-        return earlier
-    try:
-        with poses_csv.open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                pose = tuple(float(row[f"{name}_deg"]) for name in ANGLES)
-                earlier.chunk[pose] = int(row[CHUNK_COLUMN])
-                earlier.indices[pose] = [int(row[f"{name}_index"]) for name in ANGLES]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DatasetError(
-            f"{poses_csv}: not the poses of an earlier build ({error}); build again with --fresh"
-        ) from error
-    return earlier
+
+    plans: PosePlans
+    shared: list[Chunk] | None
+    by_head: Mapping[HeadName, list[Chunk]]
+
+    def of(self, subject: str, expression: str) -> list[Chunk]:
+        """The chunks of a head."""
+        return self.by_head[subject, expression] if self.shared is None else self.shared
+
+
+def chunk_poses(plans: PosePlans, size: int, earlier: PosePlans | None) -> ChunkedPoses:
+    """Cut plans into chunks of at most size poses; what was built before stays together.
+
+    earlier: of the dataset as it is, None if there is none.
+    """
+    if plans.shared is not None:
+        before = _earlier(earlier, None) if earlier is not None else NOTHING_EARLIER
+        numbers = assign_chunks(plans.shared, size, before)
+        chunked = PosePlans(plans.shared, {}, {None: numbers})
+        return ChunkedPoses(chunked, cut(plans.shared, numbers, before), {})
+    numbers_of: dict[HeadName | None, np.ndarray] = {}
+    by_head: dict[HeadName, list[Chunk]] = {}
+    for head, plan in plans.by_head.items():
+        before = _earlier(earlier, head) if earlier is not None else NOTHING_EARLIER
+        numbers_of[head] = assign_chunks(plan, size, before)
+        by_head[head] = cut(plan, numbers_of[head], before)
+    return ChunkedPoses(PosePlans(None, plans.by_head, numbers_of), None, by_head)
+
+
+def _earlier(plans: PosePlans, head: HeadName | None) -> Earlier:
+    """What was built of a head, or of all of them (None)."""
+    plan = plans.shared if plans.shared is not None else plans.by_head.get(head or ("", ""))
+    numbers = plans.chunks.get(None if plans.shared is not None else head)
+    if plan is None or numbers is None:
+        return NOTHING_EARLIER
+    poses = _tuples(plan.angles_deg)
+    return Earlier(
+        dict(zip(poses, numbers.tolist(), strict=True)),
+        dict(zip(poses, _tuples(plan.indices), strict=True)),
+    )
 
 
 def assign_chunks(plan: PosePlan, size: int, earlier: Earlier) -> np.ndarray:
@@ -64,7 +94,7 @@ def assign_chunks(plan: PosePlan, size: int, earlier: Earlier) -> np.ndarray:
     Chunks whose poses are all still there stay together; the other poses are cut, in
     the order of the plan, into new chunks of at most size poses.
     """
-    poses = [tuple(pose) for pose in plan.angles_deg.tolist()]
+    poses = _tuples(plan.angles_deg)
     known = set(poses)
     broken = {number for pose, number in earlier.chunk.items() if pose not in known}
     numbers = np.array([earlier.chunk.get(pose, -1) for pose in poses], dtype=np.int64)
@@ -81,10 +111,15 @@ def cut(plan: PosePlan, numbers: np.ndarray, earlier: Earlier) -> list[Chunk]:
     starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
     chunks = []
     for rows in np.split(order, starts[1:]):
-        poses, indices = plan.angles_deg[rows].tolist(), plan.indices[rows].tolist()
-        known = {earlier.chunk.get(tuple(pose)) for pose in poses}
+        poses, indices = _tuples(plan.angles_deg[rows]), _tuples(plan.indices[rows])
+        known = {earlier.chunk.get(pose) for pose in poses}
         before = None
         if known == {int(numbers[rows[0]])}:
-            before = [earlier.indices[tuple(pose)] for pose in poses]
+            before = tuple(earlier.indices[pose] for pose in poses)
         chunks.append(Chunk(poses, indices, before if before != indices else None))
     return chunks
+
+
+def _tuples(rows: np.ndarray) -> tuple:
+    """[N, 3] as N tuples of plain numbers."""
+    return tuple(map(tuple, rows.tolist()))

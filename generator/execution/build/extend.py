@@ -1,42 +1,77 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When a grid grows, rows that are already there only change their place in it."""
+"""Rows that are already there under another name: of a smaller grid, or of the first release."""
 
 from __future__ import annotations
 
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.format.part import read_part, write_part
-from generator.execution.build.receipts import Receipts, part_path
+from generator.dataset.format.part import part_schema_of, read_part, write_part
+from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.schema import versions_of
+from generator.errors import DatasetError
+from generator.execution.build.receipts import Receipts
+from generator.messages import BuildOrder
 from generator.plan.poses import ANGLES
 
 
-def carry_over(orders: list[dict[str, Any]], root: Path, receipts: Receipts) -> int:
-    """Rewrite the parts of units whose poses have new indices, without rendering. Returns how many.
+def carry_over(orders: Iterable[BuildOrder], root: Path, receipts: Receipts) -> int:
+    """Give units that are there under an earlier name their own, without rendering. Returns how many.
 
-    The part under the unit's earlier name stays; nobody needs it any more.
-    Raises DatasetError if a part cannot be written.
+    Where the grid grew, the places in it are rewritten. The part under the earlier name stays; nobody
+    needs it any more. Raises DatasetError if a part cannot be written.
     """
     carried = 0
     for order in orders:
-        if order["earlier_unit"] is None:
+        if not order.earlier_units or (root / order.part_path).exists():
             continue
-        earlier = part_path({**order, "unit": order["earlier_unit"]})
-        if (root / part_path(order)).exists() or not receipts.valid_part(earlier, len(order["poses"])):
-            continue
-        table = read_part(root / earlier)
-        indices = np.array(order["indices"], dtype=np.int16)
-        for axis, angle in enumerate(ANGLES):
-            at = table.schema.get_field_index(f"{angle}_index")
-            table = table.set_column(at, table.schema.field(at), pa.array(indices[:, axis]))
-        receipts.add(write_part(table, root, order["split"], order["unit"]))
-        carried += 1
+        for earlier in order.earlier_paths:
+            if part := receipts.valid_part(earlier, len(order.views)):
+                receipts.add(_renamed(order, part, root))
+                carried += 1
+                break
     return carried
 
 
-def earlier_parts(orders: list[dict[str, Any]]) -> set[str]:
+def earlier_parts(orders: Sequence[BuildOrder]) -> set[str]:
     """Where the parts lie that :func:`carry_over` reads, relative to the dataset."""
-    return {part_path({**order, "unit": order["earlier_unit"]}) for order in orders if order["earlier_unit"]}
+    return {path for order in orders for path in order.earlier_paths}
+
+
+def recorded_versions(root: Path) -> dict[str, str] | None:
+    """The versions in the first part that can be read; None if there is none."""
+    for path in sorted((root / "data").rglob("part-*.parquet")):
+        try:
+            return versions_of(part_schema_of(path))
+        except DatasetError:
+            continue  # the build will find it damaged and build it again
+    return None
+
+
+def _renamed(order: BuildOrder, part: PartInfo, root: Path) -> PartInfo:
+    table = read_part(root / part.path)
+    indices = np.array(order.indices, dtype=np.int16)
+    there = np.stack([table.column(f"{angle}_index").to_numpy() for angle in ANGLES], axis=-1)
+    if np.array_equal(there, indices):
+        _link(root / part.path, root / order.part_path)
+        return replace(part, path=order.part_path)
+    for axis, angle in enumerate(ANGLES):
+        at = table.schema.get_field_index(f"{angle}_index")
+        table = table.set_column(at, table.schema.field(at), pa.array(indices[:, axis]))
+    return write_part(table, root, order.split, order.unit)
+
+
+def _link(path: Path, target: Path) -> None:
+    """A second name for a file, or a copy where the disk has no such thing."""
+    try:
+        os.link(path, target)
+    except OSError:
+        half = target.with_name(f".{target.stem}.tmp")
+        shutil.copy2(path, half)
+        os.replace(half, target)

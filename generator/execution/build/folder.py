@@ -5,26 +5,27 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any
-
-import numpy as np
 
 from generator.dataset.format.anchors_table import ANCHORS_FILE
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import HEADS_FILE
-from generator.dataset.format.manifest import MANIFEST_FILE, POSES_FILE
+from generator.dataset.format.manifest import MANIFEST_FILE
 from generator.dataset.format.open import read_rows
-from generator.dataset.format.part import PartInfo
+from generator.dataset.format.part_info import PartInfo
 from generator.dataset.show.card import CARD_FILE
 from generator.errors import DatasetError
 from generator.execution.build.lock import LOCK_FILE
-from generator.execution.build.prepared_heads import PREPARED_FILE
-from generator.execution.build.receipts import RECEIPTS_FILE, Receipts, part_path
+from generator.execution.build.placed_heads import FIRST_PLACED_FILE, PLACED_FILE
+from generator.execution.build.receipts import RECEIPTS_FILE, Receipts
 from generator.execution.status import LOG_FILE
 from generator.heads.head import SkippedHead
-from generator.plan.config import BuildConfig, config_toml, differences, load_config
-from generator.plan.poses import PosePlan, pose_name, poses_csv
+from generator.messages import BuildOrder
+from generator.plan.config import BuildConfig, config_toml, differences, read_recorded
+from generator.plan.pose_plans import POSES_FILE, HeadName, PosePlans, is_drawn, poses_csv
+from generator.plan.poses import pose_name
+from generator.plan.settings import all_settings
 
 CONFIG_FILE, FAILURES_FILE = "config.toml", "failures.jsonl"
 MADE_HEADS = "heads"
@@ -32,15 +33,10 @@ SHEET_FILE, ANCHOR_SHEET_FILE, MAP_FILE = "contact_sheet.png", "anchors.png", "d
 
 WRITTEN = (
     CONFIG_FILE, POSES_FILE, FAILURES_FILE, MANIFEST_FILE, HEADS_FILE, ANCHORS_FILE, CARD_FILE, SHEET_FILE,
-    ANCHOR_SHEET_FILE, MAP_FILE, LOG_FILE, RECEIPTS_FILE, PREPARED_FILE, MADE_HEADS, "data", "images", "exr",
+    ANCHOR_SHEET_FILE, MAP_FILE, LOG_FILE, RECEIPTS_FILE, PLACED_FILE,
+    FIRST_PLACED_FILE, MADE_HEADS, "data", "images", "exr",
 )  # fmt: skip
 """Everything a build writes into a dataset's folder."""
-
-MAY_GROW = {
-    "heads.count", "heads.subjects", "heads.expressions", "heads.sampled_expressions", "poses.kind",
-    "poses.yaw", "poses.pitch", "poses.roll", "poses.count", "poses.seed", "poses.path",
-}  # fmt: skip
-"""Settings that choose rows and do not change what is in one."""
 
 Confirm = Callable[[str], bool]
 """Asks whether something may be done; the text says what."""
@@ -57,6 +53,21 @@ def claim(root: Path) -> None:
         raise DatasetError(f"{root} is not empty and not a Headturn dataset; choose another --out")
 
 
+def as_begun(config: BuildConfig, root: Path) -> tuple[BuildConfig, bool]:
+    """The configuration with which the dataset in root goes on, and whether it differs from what was asked.
+
+    A dataset whose heads share their random poses goes on so: other draws would replace all of its rows.
+    """
+    file = root / CONFIG_FILE
+    poses = config.poses
+    if poses.same or not is_drawn(poses) or not (file.is_file() and (root / POSES_FILE).exists()):
+        return config, False
+    begun = read_recorded(file).poses
+    if not (begun.same and is_drawn(begun)):
+        return config, False
+    return replace(config, poses=replace(poses, same=True)), True
+
+
 def check_configuration(config: BuildConfig, root: Path) -> bool:
     """May this configuration be built in root? Returns whether a dataset of it is there already.
 
@@ -66,8 +77,9 @@ def check_configuration(config: BuildConfig, root: Path) -> bool:
     mark = root / CONFIG_FILE
     if not mark.is_file():
         return False
-    changed = differences(config, load_config(mark, {}))
-    changed = [what for what in changed if what.split(":")[0] not in MAY_GROW]
+    may_grow = {known.name for known in all_settings() if known.info.grows}
+    differing = differences(config, read_recorded(mark))
+    changed = [what for name, what in differing.items() if name not in may_grow]
     if changed and not (root / POSES_FILE).exists():
         if (root / MADE_HEADS).is_dir():
             shutil.rmtree(root / MADE_HEADS)
@@ -96,22 +108,22 @@ def start_over(root: Path, confirm: Confirm) -> None:
 
 def mark(config: BuildConfig, root: Path) -> None:
     """Make root this configuration's folder. Raises DatasetError if it cannot be written."""
-    write_bytes(root / CONFIG_FILE, config_toml(config).encode())
+    write_bytes(root / CONFIG_FILE, config_toml(config.moved_to(root)).encode())
 
 
-def begin(config: BuildConfig, plan: PosePlan, chunks: np.ndarray, root: Path) -> None:
+def begin(config: BuildConfig, plans: PosePlans, root: Path) -> None:
     """Write what is to be built; from here on the dataset is unfinished until a new manifest says otherwise.
 
     Raises DatasetError if root cannot be written.
     """
     (root / MANIFEST_FILE).unlink(missing_ok=True)
     mark(config, root)
-    write_bytes(root / POSES_FILE, poses_csv(plan, chunks).encode())
+    write_bytes(root / POSES_FILE, poses_csv(plans).encode())
 
 
-def stale_parts(root: Path, orders: Iterable[dict[str, Any]]) -> list[str]:
+def stale_parts(root: Path, orders: Iterable[BuildOrder]) -> list[str]:
     """Parts that no order accounts for, relative to root. Removes what a killed build left half-written."""
-    planned = {part_path(order) for order in orders}
+    planned = {order.part_path for order in orders}
     stale = []
     for path in sorted((root / "data").rglob("*")):
         if path.name.startswith(".") and path.suffix == ".tmp":
@@ -141,14 +153,19 @@ def ask_to_drop(stale: Sequence[str], root: Path, confirm: Confirm) -> None:
         )
 
 
-def drop(stale: Iterable[str], root: Path, heads: Iterable[tuple[str, str]], plan: PosePlan) -> None:
-    """Remove parts, and the files they name that no planned (subject, expression) x pose needs."""
-    kept_heads = set(heads)
-    kept_poses = {pose_name(*pose) for pose in plan.angles_deg.tolist()}
+def drop(stale: Iterable[str], root: Path, heads: Iterable[HeadName], plans: PosePlans) -> None:
+    """Remove parts, and the files they name that no pose of a planned head needs."""
+    kept: dict[HeadName, set[str]] = {}
+    names: dict[int, set[str]] = {}  # of a plan, which many heads may share
+    for head in heads:
+        plan = plans.of(*head)
+        if id(plan) not in names:
+            names[id(plan)] = {pose_name(*pose) for pose in plan.angles_deg.tolist()}
+        kept[head] = names[id(plan)]
     for path in stale:
         for file in _files_of(root, path):
             _, subject, expression, name = file.parts
-            if (subject, expression) not in kept_heads or name.removesuffix(file.suffix) not in kept_poses:
+            if name.removesuffix(file.suffix) not in kept.get((subject, expression), ()):
                 (root / file).unlink(missing_ok=True)
         (root / path).unlink()
 

@@ -9,13 +9,11 @@ from pathlib import Path
 from generator.dataset.format.anchors_table import HeadAnchors
 from generator.dataset.format.heads_table import HeadRow
 from generator.execution.build.units import PlannedHead
-from generator.geometry.rotation import graphics_rotation
-from generator.plan.config import BuildConfig
 
 
-def head_row(planned: PlannedHead, mesh_path: str, config: BuildConfig) -> HeadRow:
+def head_row(planned: PlannedHead, mesh_path: str) -> HeadRow:
     """The row of heads.parquet. mesh_path: relative to the root of its source."""
-    head, prepared, anchors = planned.head, planned.prepared, planned.anchors
+    head, placement, anchors = planned.head, planned.placement, planned.anchors
     return HeadRow(
         subject=head.subject,
         expression=head.expression,
@@ -25,18 +23,18 @@ def head_row(planned: PlannedHead, mesh_path: str, config: BuildConfig) -> HeadR
         license=head.license,
         redistributable=head.redistributable,
         attribution=head.attribution,
-        units=prepared.units,
-        mm_per_unit=prepared.mm_per_unit,
-        up=prepared.up,
-        forward=prepared.forward,
-        pivot=prepared.pivot,
-        radius_mm=prepared.radius_mm,
-        distance_mm=planned.distance_mm,
-        lens_mm=config.render.lens_mm,
-        projection=config.render.projection,
-        frame=prepared.frame,
-        correction=prepared.correction,
-        correction_sd_deg=prepared.correction_sd_deg,
+        units=placement.units,
+        mm_per_unit=placement.mm_per_unit,
+        up=placement.up,
+        forward=placement.forward,
+        pivot=placement.pivot,
+        radius_mm=placement.radius_mm,
+        distance_mm=planned.camera.distance_mm,
+        lens_mm=planned.camera.lens_mm,
+        projection=planned.camera.projection,
+        frame=placement.frame,
+        correction=placement.correction,
+        correction_sd_deg=placement.correction_sd_deg,
         anchor_views=anchors.views,
         anchor_off=anchors.off,
         anchor_absent=anchors.absent,
@@ -46,7 +44,7 @@ def head_row(planned: PlannedHead, mesh_path: str, config: BuildConfig) -> HeadR
         vertices=planned.vertices,
         triangles=planned.triangles,
         split=planned.split,
-        problems=(*head.problems, *planned.problems, *prepared.notes),
+        problems=(*head.problems, *planned.problems, *placement.notes),
     )
 
 
@@ -57,7 +55,7 @@ def head_anchors(planned: PlannedHead) -> HeadAnchors:
         expression=planned.head.expression,
         triangles=planned.anchors.triangles,
         weights=planned.anchors.weights,
-        points=planned.anchors.turned(graphics_rotation(planned.prepared.levelling)),
+        points=planned.points,
     )
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from generator.dataset.format.files import append_line, write_bytes
 from generator.dataset.format.part import PartInfo, check_part
 from generator.errors import DatasetError
+from generator.messages import BuildOrder
 
 RECEIPTS_FILE = "receipts.jsonl"
 
@@ -65,19 +65,12 @@ class Receipts:
         return json.dumps({"part": asdict(part), "stamp": stamp})
 
 
-def part_path(order: dict[str, Any]) -> str:
-    """Where the part of a build order lies, relative to the dataset."""
-    return f"data/{order['split']}/part-{order['unit']}.parquet"
-
-
-def split_done(
-    orders: list[dict[str, Any]], receipts: Receipts
-) -> tuple[list[PartInfo], list[dict[str, Any]]]:
+def split_done(orders: Sequence[BuildOrder], receipts: Receipts) -> tuple[list[PartInfo], list[BuildOrder]]:
     """Parts that are already there and whole, and the orders still to be carried out."""
     done: list[PartInfo] = []
-    todo: list[dict[str, Any]] = []
+    todo: list[BuildOrder] = []
     for order in orders:
-        part = receipts.valid_part(part_path(order), len(order["poses"]))
+        part = receipts.valid_part(order.part_path, len(order.views))
         if part is None:
             todo.append(order)
         else:

@@ -5,35 +5,36 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from generator import __version__
 from generator.dataset.format.anchors_table import write_anchors
-from generator.dataset.format.files import file_sha256, write_bytes
+from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import write_heads
 from generator.dataset.format.manifest import (
     MANIFEST_FILE,
-    POSES_FILE,
     Manifest,
-    common_configuration,
     configuration_digest,
     read_manifest,
     write_manifest,
 )
-from generator.dataset.format.part import PartInfo
+from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.schema import ImageMode
 from generator.dataset.show.card import write_card
 from generator.dataset.show.pictures import anchor_sheet, contact_sheet, detection_map
-from generator.errors import DatasetError, HeadError
-from generator.execution.build.chunks import assign_chunks, cut, read_earlier
-from generator.execution.build.extend import carry_over, earlier_parts
+from generator.errors import DatasetError
+from generator.execution.build.chunks import chunk_poses
+from generator.execution.build.extend import carry_over, earlier_parts, recorded_versions
 from generator.execution.build.folder import (
     ANCHOR_SHEET_FILE,
     FAILURES_FILE,
     MAP_FILE,
     SHEET_FILE,
     Confirm,
+    as_begun,
     ask_to_drop,
     begin,
     check_configuration,
@@ -46,18 +47,18 @@ from generator.execution.build.folder import (
 )
 from generator.execution.build.head_rows import head_anchors, head_row, relative
 from generator.execution.build.lock import locked
-from generator.execution.build.prepared_heads import PreparedHeads, lane_versions
+from generator.execution.build.place import place_heads
+from generator.execution.build.placed_heads import lane_versions
 from generator.execution.build.receipts import Receipts, split_done
 from generator.execution.build.sources import find_source
-from generator.execution.build.units import PlannedHead, assign_split, camera_distance, plan_units
+from generator.execution.build.units import plan_units
 from generator.execution.executors.executor import Executor
-from generator.execution.lanes.lane import head_to_json
 from generator.execution.status import LoggingReporter, Reporter
-from generator.heads.head import NEUTRAL, Head, HeadSource, SkippedHead
-from generator.landmarks.anchors import Anchors
-from generator.placing.face import Prepared
-from generator.plan.config import BuildConfig
-from generator.plan.poses import PosePlan
+from generator.heads.head import SkippedHead
+from generator.messages import BuildOrder, Built, expect
+from generator.plan.config import BuildConfig, differences, recorded_config
+from generator.plan.first_settings import common_values
+from generator.plan.pose_plans import POSES_FILE, plan_poses, read_pose_plans, shared_plan
 
 
 @dataclass
@@ -104,64 +105,62 @@ def build(
         cannot be written, or confirm said no.
     """
     root = root.absolute()
-    plan = config.poses.plan()
+    shared_plan(config)  # what makes no sense is said before a folder is made
     claim(root)
     with locked(root):
         if fresh:
             start_over(root, confirm)
+        config, continued = as_begun(config, root)
         if not check_configuration(config, root):
             mark(config, root)
         with LoggingReporter(reporter, root) as logged:
             logged.log(f"headturn {__version__}: {executor.name}, {executor.workers} workers; {command}")
-            return _build(config, plan, root, executor, logged, command, confirm)
+            if continued:
+                logged.note("every head gets the same poses, as this dataset was begun")
+            return _build(config, root, executor, logged, command, confirm)
 
 
 def _build(
-    config: BuildConfig,
-    plan: PosePlan,
-    root: Path,
-    executor: Executor,
-    reporter: Reporter,
-    command: str,
-    confirm: Confirm,
+    config: BuildConfig, root: Path, executor: Executor, reporter: Reporter, command: str, confirm: Confirm
 ) -> BuildResult:
-    source = find_source(config.heads, root, reporter)
-    planned, skipped, versions = prepare_heads(source, config, root, executor, reporter)
-    earlier = read_earlier(root / POSES_FILE)
-    chunks = assign_chunks(plan, config.dataset.unit_size, earlier)
-    digest = configuration_digest(common_configuration(config.as_dict()))
+    source = find_source(config, root, reporter)
+    versions = lane_versions(executor, config.landmarks)
+    planned, skipped = place_heads(source, config, versions, root, executor, reporter)
+    heads = [(head.head.subject, head.head.expression) for head in planned]
+    earlier = read_pose_plans(root / POSES_FILE) if (root / POSES_FILE).exists() else None
+    poses = chunk_poses(plan_poses(config, heads), config.dataset.unit_size, earlier)
     orders = plan_units(
         planned,
-        cut(plan, chunks, earlier),
+        poses,
         config,
         root=root,
-        configuration_digest=digest,
+        configuration_digest=configuration_digest(common_values(config.as_dict())),
         versions=versions,
+        recorded_versions=recorded_versions(root),
     )
     receipts = Receipts(root)
     stale = stale_parts(root, orders)
     spare_skipped(stale, skipped, receipts)
     ask_to_drop([part for part in stale if part not in earlier_parts(orders)], root, confirm)
     if carried := carry_over(orders, root, receipts):
-        reporter.note(f"the grid grew: {carried} parts got new indices without being rendered again")
-    begin(config, plan, chunks, root)
-    drop(stale, root, [(head.head.subject, head.head.expression) for head in planned], plan)
+        reporter.note(f"{carried} parts were taken over without being rendered again")
+    begin(config, poses.plans, root)
+    drop(stale, root, heads, poses.plans)
     done, todo = split_done(orders, receipts)
     if done:
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")
 
-    reporter.stage("rendering", sum(len(order["poses"]) for order in todo))
+    reporter.stage("rendering", sum(len(order.views) for order in todo))
     parts, failures, seconds = run_units(todo, executor, receipts, reporter)
     write_lines(root / FAILURES_FILE, failures)
-    write_heads(
-        [head_row(head, relative(head.head.mesh_path, source.path), config) for head in planned], root
-    )
+    recorded = config.moved_to(root)
+    write_heads([head_row(head, relative(head.head.mesh_path, source.path)) for head in planned], root)
     write_anchors([head_anchors(head) for head in planned], root)
     manifest = Manifest(
         versions=versions,
-        configuration=config.as_dict(),
+        configuration=recorded.as_dict(),
         parts=tuple(sorted(done + parts, key=lambda part: part.path)),
-        images=config.dataset.images,
+        images=cast(ImageMode, config.dataset.images),
         heads=len(planned),
         skipped=tuple({"head": f"{s.subject}/{s.expression}", "reason": s.reason} for s in skipped),
         failures=len(failures),
@@ -179,101 +178,32 @@ def _build(
     return BuildResult(root, manifest, skipped, len(failures), pictures, seconds)
 
 
-def prepare_heads(
-    source: HeadSource, config: BuildConfig, root: Path, executor: Executor, reporter: Reporter
-) -> tuple[list[PlannedHead], list[SkippedHead], dict[str, str]]:
-    """Check every head and find every subject's face. Bad heads are skipped with their reason.
-
-    Returns (heads to build, heads skipped, versions). Raises UsageError if none is left.
-    """
-    subjects: dict[str, list[Head]] = defaultdict(list)
-    for head in source.heads:
-        subjects[head.subject].append(head)
-    skipped = list(source.skipped)
-    for missing in skipped:
-        reporter.note(f"skipped {missing.subject}/{missing.expression}: {missing.reason}")
-
-    orders = []
-    for heads in subjects.values():
-        # Pose zero is the neutral face's; an open mouth would move the centre.
-        heads.sort(key=lambda head: (head.expression != NEUTRAL, head.expression))
-        jobs = [head_to_json(head) for head in heads]
-        orders.append({"op": "prepare", "heads": jobs, "frame": config.poses.frame})
-    reporter.stage("preparing heads", len(orders))
-    planned: list[PlannedHead] = []
-    versions = lane_versions(executor)
-    hashes = {str(file.absolute()): file_hash(file) for head in source.heads for file in head.files}
-    for outcome in PreparedHeads(root, versions, hashes).outcomes(orders, executor):
-        reporter.advance()
-        heads = subjects[outcome.order["heads"][0]["subject"]]
-        receipt = outcome.receipt
-        facts = receipt["facts"] if receipt else [{"error": outcome.error}] * len(heads)
-        for head, fact in zip(heads, facts, strict=True):
-            if receipt is None or "error" in fact:
-                skipped.append(SkippedHead(head.subject, head.expression, head.mesh_path, fact["error"]))
-                reporter.note(f"skipped {head.name}: {fact['error']}")
-                continue
-            prepared = Prepared.from_dict(receipt["prepared"])
-            planned.append(
-                PlannedHead(
-                    head=head,
-                    prepared=prepared,
-                    file_sha256=tuple(
-                        (relative(file, source.path), hashes[str(file.absolute())]) for file in head.files
-                    ),
-                    vertices=fact["vertices"],
-                    triangles=fact["triangles"],
-                    split=assign_split(head.subject, config.dataset.validation),
-                    distance_mm=camera_distance(config, prepared),
-                    anchors=Anchors.from_dict(fact["anchors"]),
-                    problems=tuple(fact["problems"]),
-                )
-            )
-        if receipt:
-            for text in receipt["prepared"]["notes"]:
-                reporter.note(f"{heads[0].subject}: {text}")
-    if not planned:
-        reason = f"; the first: {skipped[0].reason}" if skipped else ""
-        raise HeadError(f"{source.path}: none of its heads can be built{reason}")
-    planned.sort(key=lambda head: (head.head.subject, head.head.expression))
-    return planned, skipped, versions
-
-
-def file_hash(file: Path) -> str:
-    """SHA-256 of a file; "" if it cannot be read, which preparing its head will say."""
-    try:
-        return file_sha256(file)
-    except OSError:
-        return ""
-
-
 def run_units(
-    orders: list[dict[str, Any]], executor: Executor, receipts: Receipts, reporter: Reporter
+    orders: Sequence[BuildOrder], executor: Executor, receipts: Receipts, reporter: Reporter
 ) -> tuple[list[PartInfo], list[dict[str, Any]], dict[str, float]]:
     """Carry out build orders. Returns (parts, failures, lane seconds a stage)."""
     parts: list[PartInfo] = []
     failures: list[dict[str, Any]] = []
     seconds: dict[str, float] = defaultdict(float)
     for outcome in executor.run(orders, reporter.advance):
-        head = outcome.order["head"]
+        order = expect(BuildOrder, outcome.order)
         facts = {
-            "unit": outcome.order["unit"],
-            "subject": head["subject"],
-            "expression": head["expression"],
-            "poses": len(outcome.order["poses"]),
+            "unit": order.unit,
+            "subject": order.head.subject,
+            "expression": order.head.expression,
+            "poses": len(order.views),
             "attempts": outcome.attempts,
         }
         if outcome.receipt is None:
             failures.append({**facts, "reason": outcome.error, "log": outcome.log.splitlines()})
             reporter.event("quarantined", {**facts, "reason": outcome.error})
-            reporter.note(
-                f"gave up unit {facts['unit']} of {head['subject']}/{head['expression']}: {outcome.error}"
-            )
+            reporter.note(f"gave up unit {order.unit} of {order.head.name}: {outcome.error}")
             continue
-        part = PartInfo(**outcome.receipt["part"])
+        built = expect(Built, outcome.receipt)
+        part = built.part
         receipts.add(part)
         parts.append(part)
-        spent = {stage: round(value, 3) for stage, value in outcome.receipt["seconds"].items()}
+        spent = {stage: round(value, 3) for stage, value in built.seconds.items()}
         reporter.event("unit", {**facts, "detected": part.detected, "seconds": spent})
         for stage, value in spent.items():
             seconds[stage] += value
@@ -285,7 +215,7 @@ def is_finished(config: BuildConfig, root: Path) -> bool:
     if not (root / MANIFEST_FILE).is_file():
         return False
     manifest = read_manifest(root)
-    same = configuration_digest(manifest.configuration) == configuration_digest(config.as_dict())
+    same = not differences(config, recorded_config(manifest.configuration, root))
     return same and not manifest.failures and not manifest.skipped
 
 

@@ -5,37 +5,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from generator import registries
 from generator.errors import UsageError
 from generator.execution.build.folder import MADE_HEADS
 from generator.execution.status import Progress
-from generator.heads.head import NEUTRAL, HeadSource
-from generator.heads.parametric.make import expression_name, head_name, make_heads
+from generator.heads.head import HeadSource, Made, Maker, Wish
 from generator.heads.source import find_heads
-from generator.plan.config import PARAMETRIC, Heads
+from generator.plan.config import BuildConfig
 
 
-def find_source(heads: Heads, root: Path, reporter: Progress) -> HeadSource:
-    """The heads the configuration names; parametric ones are made in root/heads first.
+def find_source(config: BuildConfig, root: Path, reporter: Progress) -> HeadSource:
+    """The heads the configuration names; those made on the spot are made in root/heads first.
 
     Raises UsageError if there is none, or a chosen subject does not exist.
     """
+    heads = config.heads
     subjects, expressions = heads.subjects, heads.expressions
-    path = Path(heads.source)
-    if heads.source == PARAMETRIC:
-        path = root / MADE_HEADS
-        reporter.stage("making heads", heads.count)
-        make_heads(
-            path,
-            count=heads.count,
-            seed=heads.seed,
-            expressions=heads.sampled_expressions,
-            progress=lambda _: reporter.advance(),
-            keep=True,
-        )
+    path = source_path(config, root)
+    if config.makes_heads:
+        made = _make(config, path, reporter)
         # The folder may hold more than are asked for now.
-        subjects = subjects or [head_name(heads.seed, index) for index in range(heads.count)]
-        sampled = [expression_name(number) for number in range(1, heads.sampled_expressions + 1)]
-        expressions = expressions or [NEUTRAL, *sampled]
+        subjects, expressions = subjects or made.subjects, expressions or made.expressions
     source = find_heads(
         path,
         expressions=expressions,
@@ -56,3 +46,17 @@ def find_source(heads: Heads, root: Path, reporter: Progress) -> HeadSource:
         tuple(h for h in source.heads if h.subject in subjects),
         tuple(s for s in source.skipped if s.subject in subjects),
     )
+
+
+def source_path(config: BuildConfig, root: Path) -> Path:
+    """Where the heads of a dataset in the folder root lie."""
+    return root / MADE_HEADS if config.makes_heads else config.located(config.heads.source)
+
+
+def _make(config: BuildConfig, path: Path, reporter: Progress) -> Made:
+    heads = config.heads
+    name, _, argument = heads.source.partition(":")
+    maker: Maker = registries.HEAD_MAKERS.get(name)
+    reporter.stage("making heads", heads.count)
+    wish = Wish(argument, heads.count, heads.seed, heads.sampled_expressions)
+    return maker.make(path, wish, reporter.advance)

@@ -1,39 +1,53 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Units of work: one head x one chunk of poses, named by everything that decides the content."""
+"""From heads and poses to units of work, named by what decides their content."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from generator.dataset.format.schema import SCHEMA_VERSION
-from generator.execution.build.chunks import Chunk
-from generator.execution.lanes.lane import head_to_json
-from generator.geometry.camera import framing_distance
+import numpy as np
+
+from generator.codec import to_plain
+from generator.content import deciding
+from generator.execution.build import first_release
+from generator.execution.build.chunks import Chunk, ChunkedPoses, Indices
+from generator.geometry.camera import Camera
 from generator.geometry.rotation import graphics_rotation
 from generator.heads.head import Head
-from generator.landmarks.anchors import Anchors, pack
-from generator.placing.face import Prepared
+from generator.heads.placement import Placement
+from generator.landmarks.anchors import Anchors
+from generator.messages import BuildOrder
 from generator.plan.config import BuildConfig
+from generator.plan.settings import ROWS, beyond_defaults
+from generator.plan.views import Views, framed_camera, plan_views
 
 
 @dataclass(frozen=True)
 class PlannedHead:
-    """A head that will be built, and what preparing it found."""
+    """A head that will be built, and what placing it found.
+
+    camera: that frames it; views may have others.
+    """
 
     head: Head
-    prepared: Prepared
+    placement: Placement
     file_sha256: tuple[tuple[str, str], ...]
     vertices: int
     triangles: int
     split: str
-    distance_mm: float
+    camera: Camera
     anchors: Anchors
     problems: tuple[str, ...] = ()
+
+    @property
+    def points(self) -> np.ndarray:
+        """The anchors at the pose zero of the dataset, float64 [P, 3], frame C, mm."""
+        return self.anchors.turned(graphics_rotation(self.placement.levelling))
 
 
 def assign_split(subject: str, validation: float) -> str:
@@ -42,74 +56,95 @@ def assign_split(subject: str, validation: float) -> str:
     return "validation" if share < validation else "train"
 
 
-def camera_distance(config: BuildConfig, prepared: Prepared) -> float:
-    """Camera to pivot in mm, rounded to 0.01: as configured, or what frames this head."""
-    settings = config.render.settings()
-    if settings.distance_mm is not None:
-        return settings.distance_mm
-    return round(
-        framing_distance(prepared.radius_mm, settings.lens_mm, settings.margin, settings.projection), 2
-    )
+def head_camera(config: BuildConfig, placement: Placement) -> Camera:
+    """The camera that frames a head."""
+    return framed_camera(config.render, placement.radius_mm)
 
 
 def plan_units(
-    heads: list[PlannedHead],
-    chunks: Sequence[Chunk],
+    heads: Sequence[PlannedHead],
+    poses: ChunkedPoses,
     config: BuildConfig,
     *,
     root: Path,
     configuration_digest: str,
-    versions: dict[str, str],
-) -> list[dict[str, Any]]:
-    """The build orders of every unit, head by head; see :class:`generator.execution.lanes.lane.Lane`.
+    versions: Mapping[str, str],
+    recorded_versions: Mapping[str, str] | None = None,
+) -> list[BuildOrder]:
+    """The build orders of every unit, head by head.
 
-    A unit's name is the hash of head files, placement, look, poses, detector and
-    versions, so a part that is already there under that name needs no rebuilding.
-    "earlier_unit" is the name it had when its poses had another place in the grid.
+    A unit's name is the hash of everything that decides its content: the content version and the
+    libraries, head files, placement, views, settings that are not the default. So a part that is
+    already there under that name needs no rebuilding. recorded_versions: of the parts that are
+    there, if any: those of the first release have other names, which the orders know.
     """
-    settings = config.render.settings().as_dict()
-    names = [_digest([chunk.poses, chunk.indices]) for chunk in chunks]
-    earlier_names = [_digest([c.poses, c.earlier_indices]) if c.earlier_indices else None for c in chunks]
+    settings = beyond_defaults(config.as_dict(), lambda s: s.info.content and s.section not in ROWS)
     orders = []
     for planned in heads:
-        content = {
-            "settings": settings,
-            "prepared": planned.prepared.as_dict(),
-            "anchors": pack(planned.anchors.turned(graphics_rotation(planned.prepared.levelling)), "<f8"),
-            "distance_mm": planned.distance_mm,
-            "split": planned.split,
-            "images": config.dataset.images,
-            "image_format": config.dataset.image_format,
-            "passes": config.dataset.passes,
-        }
-        look = _digest(
+        head, points = planned.head, planned.points
+        fixed = _digest(
             {
-                **content,
-                "subject": planned.head.subject,
-                "expression": planned.head.expression,
-                "license": [planned.head.license, planned.head.redistributable],
+                "versions": deciding(versions),
+                "subject": head.subject,
+                "expression": head.expression,
+                "license": [head.license, head.redistributable],
                 "files": planned.file_sha256,
-                "landmarks": config.landmarks.model_dump(),
-                "versions": versions,
-                "schema": SCHEMA_VERSION,
+                "placement": to_plain(planned.placement),
+                "anchors": to_plain(points),
+                "split": planned.split,
+                "settings": settings,
             }
         )
-        head = head_to_json(planned.head)
-        for chunk, name, earlier in zip(chunks, names, earlier_names, strict=True):
+        earlier = first_release.names(planned, config, recorded_versions, versions)
+        for chunk in poses.of(head.subject, head.expression):
+            views = plan_views(config.render, planned.placement.radius_mm, chunk.poses)
+            seen = [to_plain(views.cameras), to_plain(views.looks)]
+
+            def name(indices: Any, chunk: Chunk = chunk, seen: Any = seen, fixed: str = fixed) -> str:
+                return _digest([fixed, seen, chunk.poses, indices])[:16]
+
+            before = [name(chunk.earlier_indices)] if chunk.earlier_indices else []
+            if earlier is not None:
+                before += [earlier(chunk.poses, i) for i in (chunk.indices, chunk.earlier_indices) if i]
+            order = build_order(
+                head, planned.placement, points, planned.split, views, chunk.indices, config, root
+            )
             orders.append(
-                {
-                    "op": "build",
-                    "unit": _digest([look, name])[:16],
-                    "earlier_unit": _digest([look, earlier])[:16] if earlier else None,
-                    "head": head,
-                    "root": str(root),
-                    "configuration_digest": configuration_digest,
-                    "poses": chunk.poses,
-                    "indices": chunk.indices,
-                    **content,
-                }
+                replace(
+                    order,
+                    unit=name(chunk.indices),
+                    configuration_digest=configuration_digest,
+                    earlier_units=tuple(before),
+                )
             )
     return orders
+
+
+def build_order(
+    head: Head,
+    placement: Placement,
+    points: np.ndarray,
+    split: str,
+    views: Views,
+    indices: tuple[Indices, ...],
+    config: BuildConfig,
+    root: Path,
+) -> BuildOrder:
+    """An order for some views of a placed head, without a name yet. points: see BuildOrder.anchors."""
+    return BuildOrder(
+        unit="unnamed",
+        head=head,
+        root=str(root),
+        views=views,
+        indices=indices,
+        placement=placement,
+        anchors=points,
+        split=split,
+        images=config.dataset.images,
+        image_format=config.dataset.image_format,
+        passes=config.dataset.passes,
+        landmarks=config.landmarks,
+    )
 
 
 def _digest(values: Any) -> str:

@@ -4,11 +4,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
 
-from generator.execution.lanes.lane import OnFrame
+from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.slot import Outcome
+from generator.messages import LaneOrder
 from generator.process import available_cores
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What an executor is made from.
+
+    scratch: an existing folder. workers: lanes; None leaves it to the executor. address: of a
+    cluster, None for this machine. options: of every lane, which gets a scratch folder of its own.
+    """
+
+    scratch: Path
+    workers: int | None
+    address: str | None
+    options: LaneOptions
 
 
 class Executor(Protocol):
@@ -17,8 +34,8 @@ class Executor(Protocol):
     name: str
     workers: int
 
-    def run(self, orders: Sequence[dict[str, Any]], on_frame: OnFrame) -> Iterator[Outcome]:
-        """Yield the outcome of each order as it comes; on_frame may be called from any thread."""
+    def run(self, orders: Sequence[LaneOrder], on_image: OnImage) -> Iterator[Outcome]:
+        """Yield the outcome of each order as it comes; on_image may be called from any thread."""
         ...
 
     def close(self) -> None:

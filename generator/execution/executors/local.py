@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
-from generator.execution.executors.executor import share_cores
+from generator.execution.executors.executor import Circumstances, share_cores
 from generator.execution.executors.order_queue import OrderQueue
-from generator.execution.lanes.lane import LaneOptions, OnFrame
 from generator.execution.lanes.lane_process import LaneProcess
+from generator.execution.lanes.options import OnImage
 from generator.execution.lanes.slot import LaneSlot, Outcome
+from generator.messages import LaneOrder
+from generator.process import available_cores
 
 
 class LocalExecutor:
@@ -29,18 +29,18 @@ class LocalExecutor:
 
     name = "local"
 
-    def __init__(self, scratch: Path, workers: int, options: LaneOptions) -> None:
-        self.workers = workers
+    def __init__(self, given: Circumstances) -> None:
+        self.workers = given.workers or len(available_cores())
         self._slots = []
-        for k, cpus in enumerate(share_cores(workers)):
-            folder = scratch / f"lane{k}"
+        for k, cpus in enumerate(share_cores(self.workers)):
+            folder = given.scratch / f"lane{k}"
             folder.mkdir()
-            own = replace(options, scratch=str(folder), threads=len(cpus), cpus=cpus)
+            own = replace(given.options, scratch=str(folder), threads=len(cpus), cpus=cpus)
             self._slots.append(LaneSlot(partial(LaneProcess, own)))
         # A lane ends with the thread that started it, so these threads live as long as the lanes.
-        self._threads = ThreadPoolExecutor(workers)
+        self._threads = ThreadPoolExecutor(self.workers)
 
-    def run(self, orders: Sequence[dict[str, Any]], on_frame: OnFrame) -> Iterator[Outcome]:
+    def run(self, orders: Sequence[LaneOrder], on_image: OnImage) -> Iterator[Outcome]:
         """See :class:`generator.execution.executors.executor.Executor`."""
         waiting = OrderQueue(orders)
         outcomes: queue.SimpleQueue[Outcome | Exception] = queue.SimpleQueue()
@@ -51,7 +51,7 @@ class LocalExecutor:
             while not stop.is_set() and (taken := waiting.take(head)) is not None:
                 head, order = taken
                 try:
-                    outcomes.put(slot.run(order, on_frame))
+                    outcomes.put(slot.run(order, on_image))
                 except Exception as error:  # handed to the thread that waits, which raises it
                     outcomes.put(error)
                     return

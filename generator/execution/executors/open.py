@@ -7,16 +7,14 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from generator import registries
 from generator.errors import UsageError
-from generator.execution.executors.executor import Executor
-from generator.execution.executors.local import LocalExecutor
-from generator.execution.executors.serial import SerialExecutor
-from generator.execution.lanes.lane import LaneOptions
-from generator.execution.lanes.renderer import DEADLINE_S, check_blender, worker_command
+from generator.execution.executors.executor import Circumstances, Executor
+from generator.execution.lanes.options import DEADLINE_S, LaneOptions
+from generator.execution.lanes.renderer import check_blender, worker_command
 from generator.execution.lanes.scratch import scratch_folder
 from generator.process import MIB, available_cores
 
-EXECUTORS = ("serial", "local", "ray")
 MEMORY_SHARE = 0.8
 """Of this machine's memory, for all lanes together, where no limit is given."""
 
@@ -27,40 +25,27 @@ def open_executor(
     *,
     workers: int | None = None,
     blender: str | None = None,
-    min_confidence: float = 0.5,
     deadline_s: float = DEADLINE_S,
     memory_mib: float | None = None,
     address: str | None = None,
 ) -> Iterator[Executor]:
     """An executor with its scratch folder; both are gone at the end, however it comes.
 
-    name: one of EXECUTORS. workers: lanes, default one a core. deadline_s, memory_mib:
-    see :class:`generator.execution.lanes.lane.LaneOptions`. address: of a Ray cluster.
+    name: one of registries.EXECUTORS. workers: lanes, default one a core. deadline_s, memory_mib:
+    see :class:`generator.execution.lanes.options.LaneOptions`. address: of a Ray cluster.
     Raises UsageError for an unknown name, if no Blender can be found, or Ray is not installed.
     """
-    if name not in EXECUTORS:
-        raise UsageError(f"executor {name!r}: expected one of {', '.join(EXECUTORS)}")
+    make = registries.EXECUTORS.get(name)
     if address is not None and name != "ray":
         raise UsageError(f"--address is for --executor ray, not {name}")
     worker_command(blender, 1)
     if blender is not None:
         check_blender(blender)
-    lanes = workers or len(available_cores())
     if memory_mib is None:
-        memory_mib = MEMORY_SHARE * _memory_mib() / lanes
-    options = LaneOptions(
-        blender=blender, min_confidence=min_confidence, deadline_s=deadline_s, memory_mib=memory_mib
-    )
+        memory_mib = MEMORY_SHARE * _memory_mib() / (workers or len(available_cores()))
+    options = LaneOptions(blender=blender, deadline_s=deadline_s, memory_mib=memory_mib)
     with scratch_folder() as scratch:
-        executor: Executor
-        if name == "serial":
-            executor = SerialExecutor(scratch, options)
-        elif name == "local":
-            executor = LocalExecutor(scratch, lanes, options)
-        else:
-            from generator.execution.executors.ray import RayExecutor
-
-            executor = RayExecutor(workers, address, options)
+        executor: Executor = make(Circumstances(scratch, workers, address, options))
         try:
             yield executor
         finally:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import threading
 from collections import Counter, deque
 from collections.abc import Sequence
-from typing import Any
+
+from generator.messages import BuildOrder, LaneOrder
 
 Key = str
 
@@ -17,16 +18,15 @@ class OrderQueue:
     Thread-safe. Orders without a head each form a group of their own.
     """
 
-    def __init__(self, orders: Sequence[dict[str, Any]]) -> None:
+    def __init__(self, orders: Sequence[LaneOrder]) -> None:
         self._lock = threading.Lock()
-        self._groups: dict[Key, deque[dict[str, Any]]] = {}
+        self._groups: dict[Key, deque[LaneOrder]] = {}
         self._holders: Counter[Key] = Counter()
         for number, order in enumerate(orders):
-            head = order.get("head")
-            key = f"{head['subject']}/{head['expression']}" if head else f"#{number}"
+            key = order.head.name if isinstance(order, BuildOrder) else f"#{number}"
             self._groups.setdefault(key, deque()).append(order)
 
-    def take(self, held: Key | None) -> tuple[Key, dict[str, Any]] | None:
+    def take(self, held: Key | None) -> tuple[Key, LaneOrder] | None:
         """The next order and its key for a lane that holds a head; None when nothing is left.
 
         Without an order for the held head: the first head nobody holds, else the

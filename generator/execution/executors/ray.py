@@ -14,10 +14,13 @@ from dataclasses import asdict
 from typing import Any
 
 from generator.errors import DatasetError, UsageError
+from generator.execution.executors.executor import Circumstances
 from generator.execution.executors.order_queue import OrderQueue
-from generator.execution.lanes.lane import Lane, LaneOptions, OnFrame
+from generator.execution.lanes.lane import Lane
+from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.scratch import remove_leftovers, scratch_folder
 from generator.execution.lanes.slot import ATTEMPTS, LaneSlot, Outcome
+from generator.messages import BuildOrder, LaneOrder, from_json, to_json
 from generator.process import available_cores
 
 IN_FLIGHT = 2
@@ -51,13 +54,14 @@ class LaneActor:
         self._slot = LaneSlot(lambda: Lane(own))
 
     def run(self, order: str) -> str:
-        """Carry out one order. Returns {"receipt", "error", "attempts", "log", "pid"} or {"fatal"}."""
+        """Carry out one order. Returns {"receipt", "error", "attempts", "log"} or {"fatal"}."""
         try:
-            outcome = self._slot.run(json.loads(order), lambda: None)
+            outcome = self._slot.run(from_json(json.loads(order)), lambda: None)
         except DatasetError as error:
             return json.dumps({"fatal": str(error)})
-        values = {key: value for key, value in vars(outcome).items() if key != "order"}
-        return json.dumps({**values, "pid": os.getpid()})
+        values = {key: value for key, value in vars(outcome).items() if key not in ("order", "receipt")}
+        receipt = None if outcome.receipt is None else to_json(outcome.receipt)
+        return json.dumps({**values, "receipt": receipt})
 
     def close(self) -> None:
         """End the render worker and remove the scratch folder."""
@@ -68,17 +72,16 @@ class LaneActor:
 class RayExecutor:
     """See :class:`generator.execution.executors.executor.Executor`.
 
-    Parameters
-    ----------
-    workers: actors; default every core of the cluster, or of this machine.
-    address: of a running cluster, or "auto"; None starts Ray here, on loopback only.
+    Actors are as many as workers are asked for; by default every core of the cluster, or of this
+    machine. An address names a running cluster, or is "auto"; None starts Ray here, on loopback only.
 
     Raises UsageError if Ray is not installed or no cluster answers.
     """
 
     name = "ray"
 
-    def __init__(self, workers: int | None, address: str | None, options: LaneOptions) -> None:
+    def __init__(self, circumstances: Circumstances) -> None:
+        workers, address = circumstances.workers, circumstances.address
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         if address is None:
             # Read when ray is imported: a Ray that cannot be joined listens on 127.0.0.1 alone.
@@ -111,21 +114,21 @@ class RayExecutor:
                 raise UsageError(f"--address {address}: no Ray cluster answers ({error})") from error
             self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
         remote: Any = ray.remote(num_cpus=1, max_restarts=-1, max_task_retries=ATTEMPTS - 1)(LaneActor)
-        given = json.dumps(asdict(options))
+        given = json.dumps(asdict(circumstances.options))
         self._actors = [remote.remote(given) for _ in range(self.workers)]
         self._busy = False
 
-    def run(self, orders: Sequence[dict[str, Any]], on_frame: OnFrame) -> Iterator[Outcome]:
+    def run(self, orders: Sequence[LaneOrder], on_image: OnImage) -> Iterator[Outcome]:
         """See the Executor protocol; frames are told of when their unit is done."""
         waiting = OrderQueue(orders)
         held: list[str | None] = [None] * len(self._actors)
-        in_flight: dict[Any, tuple[int, dict[str, Any]]] = {}
+        in_flight: dict[Any, tuple[int, LaneOrder]] = {}
 
         def feed(number: int) -> None:
             taken = waiting.take(held[number])
             if taken is not None:
                 held[number], order = taken
-                in_flight[self._actors[number].run.remote(json.dumps(order))] = number, order
+                in_flight[self._actors[number].run.remote(json.dumps(to_json(order)))] = number, order
 
         self._busy = True
         for _ in range(IN_FLIGHT):
@@ -136,9 +139,9 @@ class RayExecutor:
             number, order = in_flight.pop(ready)
             outcome = self._outcome(ready, order)
             feed(number)
-            if outcome.receipt is not None:
-                for _ in order.get("poses", ()):
-                    on_frame()
+            if outcome.receipt is not None and isinstance(order, BuildOrder):
+                for _ in order.views:
+                    on_image()
             yield outcome
         self._busy = False
 
@@ -152,7 +155,7 @@ class RayExecutor:
         self._ray.shutdown()
         remove_leftovers()
 
-    def _outcome(self, ready: Any, order: dict[str, Any]) -> Outcome:
+    def _outcome(self, ready: Any, order: LaneOrder) -> Outcome:
         try:
             values = json.loads(self._ray.get(ready))
         except self._ray.exceptions.RayError as error:
@@ -162,8 +165,8 @@ class RayExecutor:
             return Outcome(order, None, reason, ATTEMPTS, told)
         if "fatal" in values:
             raise DatasetError(values["fatal"])
-        values.pop("pid")
-        return Outcome(order, **values)
+        receipt = values.pop("receipt")
+        return Outcome(order, None if receipt is None else from_json(receipt), **values)
 
 
 def _answers(address: str) -> None:

@@ -5,27 +5,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
-from generator.execution.lanes.lane import Lane, LaneOptions, OnFrame
+from generator.execution.executors.executor import Circumstances
+from generator.execution.lanes.lane import Lane
+from generator.execution.lanes.options import OnImage
 from generator.execution.lanes.slot import LaneSlot, Outcome
+from generator.messages import LaneOrder
 
 
 class SerialExecutor:
-    """See :class:`generator.execution.executors.executor.Executor`. scratch: an existing folder."""
+    """See :class:`generator.execution.executors.executor.Executor`."""
 
     name, workers = "serial", 1
 
-    def __init__(self, scratch: Path, options: LaneOptions) -> None:
-        folder = scratch / "lane0"
+    def __init__(self, given: Circumstances) -> None:
+        folder = given.scratch / "lane0"
         folder.mkdir()
-        self._slot = LaneSlot(lambda: Lane(replace(options, scratch=str(folder))))
+        self._slot = LaneSlot(lambda: Lane(replace(given.options, scratch=str(folder))))
 
-    def run(self, orders: Sequence[dict[str, Any]], on_frame: OnFrame) -> Iterator[Outcome]:
+    def run(self, orders: Sequence[LaneOrder], on_image: OnImage) -> Iterator[Outcome]:
         """See :class:`generator.execution.executors.executor.Executor`."""
         for order in orders:
-            yield self._slot.run(order, on_frame)
+            yield self._slot.run(order, on_image)
 
     def close(self) -> None:
         """End the render worker."""

@@ -18,29 +18,31 @@ def main() -> None:
     end_with_parent()
     import cv2
 
-    from generator.execution.lanes.lane import Lane, LaneOptions
+    from generator.codec import from_plain
+    from generator.execution.lanes.lane import Lane
+    from generator.execution.lanes.options import LaneOptions
+    from generator.messages import LaneFailed, LaneReady, Progressed, from_json, to_json
 
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # whatever a library prints goes to the log
 
-    def answer(receipt: dict[str, Any]) -> None:
-        receipts.write(json.dumps(receipt) + "\n")
+    def answer(message: Any) -> None:
+        receipts.write(json.dumps(to_json(message)) + "\n")
 
-    answer({"ready": os.getpid()})
-    options = json.loads(sys.stdin.readline())
-    if options["cpus"] and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, options["cpus"])  # inherited by the render worker
+    answer(LaneReady(os.getpid()))
+    options = from_plain(LaneOptions, json.loads(sys.stdin.readline()))
+    if options.cpus and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, options.cpus)  # inherited by the render worker
     cv2.setNumThreads(1)
     lane: Lane | None = None
     try:
         for line in sys.stdin:
             try:
                 if lane is None:
-                    lane = Lane(LaneOptions(**{**options, "cpus": tuple(options["cpus"])}))
-                answer({"receipt": lane.run(json.loads(line), lambda: answer({"frame": 1}))})
+                    lane = Lane(options)
+                answer(lane.run(from_json(json.loads(line)), lambda: answer(Progressed())))
             except HeadturnError as error:
-                log = getattr(error, "log", "")
-                answer({"error": str(error), "type": type(error).__name__, "log": log})
+                answer(LaneFailed(str(error), type(error).__name__, getattr(error, "log", "")))
     finally:
         if lane is not None:
             lane.close()

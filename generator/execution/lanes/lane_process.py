@@ -4,14 +4,24 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from generator import errors
+from generator.codec import to_plain
 from generator.errors import WorkerError
-from generator.execution.lanes.lane import LaneOptions, OnFrame
 from generator.execution.lanes.lines import LineProcess
+from generator.execution.lanes.options import LaneOptions, OnImage
+from generator.messages import (
+    LaneFailed,
+    LaneOrder,
+    LaneReady,
+    Progressed,
+    Receipt,
+    expect,
+    from_json,
+    to_json,
+)
 
 PATIENCE = 1.5
 """How much longer than for its render worker one waits for a lane: it answers for both."""
@@ -24,7 +34,7 @@ class LaneProcess:
         log = Path(options.scratch) / "lane.log"
         self._deadline_s = options.deadline_s * PATIENCE
         self._process = LineProcess([sys.executable, "-m", "generator.execution.lanes.lane_main"], log)
-        self._process.send(asdict(options))
+        self._process.send(to_plain(options))
         self._ready = False
 
     @property
@@ -32,23 +42,21 @@ class LaneProcess:
         """Process id of the lane; its render worker is a child of that."""
         return self._process.pid
 
-    def run(self, order: dict[str, Any], on_frame: OnFrame) -> dict[str, Any]:
-        """See :meth:`generator.execution.lanes.lane.Lane.run`."""
+    def run(self, order: LaneOrder, on_image: OnImage) -> Receipt:
+        """See :class:`generator.execution.lanes.options.AnyLane`."""
         if not self._ready:
             # A lane that was orphaned while it started finds no order, and so nothing to do.
-            self._process.receive(self._deadline_s)
+            expect(LaneReady, self._receive())
             self._ready = True
-        self._process.send(order)
-        while True:
-            answer = self._process.receive(self._deadline_s)
-            if "frame" in answer:
-                on_frame()
-            elif "receipt" in answer:
-                return answer["receipt"]
-            elif answer["type"] == WorkerError.__name__:
-                raise WorkerError(answer["error"], answer["log"])
-            else:
-                raise getattr(errors, answer["type"])(answer["error"])
+        self._process.send(to_json(order))
+        while isinstance(answer := self._receive(), Progressed):
+            on_image()
+        if isinstance(answer, LaneFailed):
+            if answer.kind == WorkerError.__name__:
+                raise WorkerError(answer.reason, answer.log)
+            raise getattr(errors, answer.kind)(answer.reason)
+        receipt: Receipt = answer
+        return receipt
 
     def close(self) -> None:
         """End the child and its render worker."""
@@ -57,3 +65,6 @@ class LaneProcess:
     def kill(self) -> None:
         """End the child now; its render worker goes with it, see :mod:`generator.process`."""
         self._process.kill()
+
+    def _receive(self) -> Any:
+        return from_json(self._process.receive(self._deadline_s))

@@ -11,18 +11,28 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Literal
 
-from generator.errors import HeadError, UsageError, WorkerError
+from generator.errors import HeadError, UsageError
 from generator.execution.lanes.lines import LineProcess
+from generator.execution.lanes.options import DEADLINE_S
 from generator.execution.lanes.scratch import scratch_folder
-from generator.plan.render_settings import RenderSettings
+from generator.messages import (
+    ConvertOrder,
+    OrderDone,
+    OrderFailed,
+    Rendered,
+    RenderOrder,
+    WorkerReady,
+    expect,
+    from_json,
+    to_json,
+)
+from generator.plan.views import Views
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 
 OLDEST_BLENDER = (4, 2)
-
-DEADLINE_S = 300.0
-"""Longest wait for one sign of life. Loading a large scan and its first frame take seconds."""
 
 
 def worker_command(blender: str | None, threads: int) -> list[str]:
@@ -63,11 +73,11 @@ def check_blender(blender: str) -> None:
 
 
 class Renderer:
-    """One render worker and the folder its frames appear in.
+    """One render worker and the folder its images appear in.
 
     Parameters
     ----------
-    frames: an existing folder, best on a tmpfs.
+    images: an existing folder, best on a tmpfs.
     blender: a Blender executable; None uses the bpy wheel.
     threads: Cycles threads; 0 means every core.
     deadline_s: a worker that is silent for so long hangs, and is ended.
@@ -75,14 +85,14 @@ class Renderer:
 
     def __init__(
         self,
-        frames: Path,
+        images: Path,
         log: Path,
         *,
         blender: str | None = None,
         threads: int = 0,
         deadline_s: float = DEADLINE_S,
     ) -> None:
-        self.frames = frames
+        self.images = images
         self._deadline_s = deadline_s
         path = os.pathsep.join([str(_PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
         # A Blender executable must not see our environment: its Python is another one.
@@ -90,12 +100,9 @@ class Renderer:
         # Nor another colour management, which studios set for all programs and Blender 5 for its children.
         env["OCIO"] = ""
         # Blender's own temporary folder goes with ours, also when the worker is killed.
-        env |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(frames))
+        env |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(images))
         self._process = LineProcess(worker_command(blender, threads), log, env)
-        ready = self._process.receive(deadline_s)
-        if "ready" not in ready:
-            raise WorkerError(f"the render worker did not start: {ready}")
-        self.version: str = ready["ready"]
+        self.version = expect(WorkerReady, self._receive()).version
 
     @property
     def pid(self) -> int:
@@ -105,41 +112,28 @@ class Renderer:
     def render(
         self,
         package: Path,
-        settings: RenderSettings,
-        distance_mm: float,
-        poses: Sequence[Sequence[float]],
+        views: Views,
         *,
-        frame_format: str = "bmp",
+        kind: Literal["bmp", "exr"] = "bmp",
         passes: Sequence[str] = (),
     ) -> Iterator[Path]:
-        """Render poses [(yaw, pitch, roll) degrees, ...] of a prepared head.
+        """Render views of a packaged head.
 
-        passes: render these instead of the picture, see generator.blender.passes.
+        kind: .bmp (sRGB) or .exr (linear float32).
+        passes: render these, as .exr, instead of the picture; see generator.blender.passes.
 
-        Yields each frame's path as soon as it is written; the caller removes it.
-        Raises HeadError if Blender cannot load the head, WorkerError if the
-        worker dies.
+        Yields the path of each image as soon as it is written; the caller removes it.
+        Raises HeadError if Blender cannot load the head, WorkerError if the worker dies.
         """
-        self._process.send(
-            {
-                "op": "render",
-                "package": str(package),
-                "settings": settings.as_dict(),
-                "distance_mm": distance_mm,
-                "poses": [list(map(float, pose)) for pose in poses],
-                "out": str(self.frames),
-                "format": "exr" if passes else frame_format,
-                "passes": list(passes),
-            }
-        )
+        kind = "exr" if passes else kind
+        self._send(RenderOrder(str(package), views, str(self.images), kind, tuple(passes)))
         for receipt in self._receipts():
-            if "path" in receipt:
-                yield Path(receipt["path"])
+            yield Path(receipt.path)
 
     def import_mesh(self, source: Path, folder: Path) -> Path:
         """Have Blender read an FBX file and write it into folder as GLB, whose path is returned."""
         target = folder / f"{source.stem}.glb"
-        self._process.send({"op": "convert", "source": str(source), "target": str(target)})
+        self._send(ConvertOrder(str(source), str(target)))
         for _ in self._receipts():
             pass
         return target
@@ -152,14 +146,18 @@ class Renderer:
         """End the worker now."""
         self._process.kill()
 
-    def _receipts(self) -> Iterator[dict]:
-        while True:
-            receipt = self._process.receive(self._deadline_s)
-            if "error" in receipt:
-                raise HeadError(f"Blender: {receipt['error']}")
-            yield receipt
-            if "done" in receipt:
-                return
+    def _send(self, order: RenderOrder | ConvertOrder) -> None:
+        self._process.send(to_json(order))
+
+    def _receive(self) -> object:
+        return from_json(self._process.receive(self._deadline_s))
+
+    def _receipts(self) -> Iterator[Rendered]:
+        """What comes until the order is done."""
+        while not isinstance(receipt := self._receive(), OrderDone):
+            if isinstance(receipt, OrderFailed):
+                raise HeadError(f"Blender: {receipt.reason}")
+            yield expect(Rendered, receipt)
 
 
 @contextmanager

@@ -6,10 +6,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 from generator.errors import HeadError, WorkerError
-from generator.execution.lanes.lane import OnFrame
+from generator.execution.lanes.options import AnyLane, OnImage
+from generator.messages import LaneOrder, Receipt
 
 ATTEMPTS = 3
 """How often an order is tried, each time in a fresh lane, before it is given up."""
@@ -22,21 +22,11 @@ class Outcome:
     attempts: in how many lanes it was tried. log: the end of the last one's log.
     """
 
-    order: dict[str, Any]
-    receipt: dict[str, Any] | None
+    order: LaneOrder
+    receipt: Receipt | None
     error: str = ""
     attempts: int = 1
     log: str = ""
-
-
-class AnyLane(Protocol):
-    """A lane in this process or another; see :class:`generator.execution.lanes.lane.Lane`."""
-
-    def run(self, order: dict[str, Any], on_frame: OnFrame) -> dict[str, Any]: ...
-
-    def close(self) -> None: ...
-
-    def kill(self) -> None: ...
 
 
 class LaneSlot:
@@ -48,13 +38,13 @@ class LaneSlot:
         self._lane: AnyLane | None = None
         self._busy = self._closed = False
 
-    def run(self, order: dict[str, Any], on_frame: OnFrame) -> Outcome:
+    def run(self, order: LaneOrder, on_image: OnImage) -> Outcome:
         """Carry out one order. Raises whatever makes the whole build pointless (DatasetError)."""
         failed = WorkerError("the build was stopped")
         self._busy = True
         for attempt in range(1, ATTEMPTS + 1):
             try:
-                receipt = self._ready_lane().run(order, on_frame)
+                receipt = self._ready_lane().run(order, on_image)
             except HeadError as error:
                 self._busy = False
                 return Outcome(order, None, str(error), attempt)

@@ -9,17 +9,16 @@ import cv2
 import numpy as np
 
 from generator.errors import DatasetError, HeadError, UsageError
-from generator.execution.build.units import camera_distance
-from generator.execution.lanes.renderer import Renderer
+from generator.execution.lanes.lane import Lane
+from generator.execution.lanes.options import LaneOptions
 from generator.execution.lanes.scratch import scratch_folder
 from generator.geometry.rotation import rotation_from_angles
 from generator.heads.head import NEUTRAL
 from generator.heads.package import save_package
-from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
-from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
-from generator.placing.face import prepare
+from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig
+from generator.plan.views import plan_views
 from generator.process import native_silence
 
 DOT = (80, 255, 80)
@@ -45,7 +44,7 @@ def render_preview(
     rotation_from_angles(np.array(pose))
     wanted = config.heads
     source = find_heads(
-        Path(wanted.source),
+        config.located(wanted.source),
         expressions=[expression] if expression else None,
         units=wanted.units,
         up=wanted.up,
@@ -59,31 +58,34 @@ def render_preview(
             f"{source.path} holds {len(subjects)} subjects; give the folder of one, or one mesh file"
         )
     head = next((h for h in source.heads if h.expression == NEUTRAL), source.heads[0])
-    settings = config.render.settings()
     with scratch_folder() as scratch, native_silence():  # MediaPipe's start-up notes
-        renderer = Renderer(scratch, scratch / "render.log", blender=blender)
-        detector = MediaPipeFaceMesh(config.landmarks.min_confidence)
+        lane = Lane(LaneOptions(scratch=str(scratch), blender=blender))
         try:
-            mesh = read_mesh(head, scratch, import_with_blender=renderer.import_mesh)
-            prepared = prepare(head, mesh, renderer, detector, scratch)
-            package = scratch / "head.npz"
-            save_package(prepared.normalise(mesh), package)
-            [frame] = renderer.render(package, settings, camera_distance(config, prepared), [pose])
-            image = cv2.imread(str(frame))
-            found = detector.detect(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+            mesh = lane.read(head)
+            placement = lane.placer(config.landmarks).face(head, mesh)
+            package = scratch / "preview.npz"
+            save_package(placement.normalise(mesh), package)
+            [path] = lane.renderer.render(package, plan_views(config.render, placement.radius_mm, [pose]))
+            image = read_image(path)
+            found = lane.detector(config.landmarks).detect(image)
         finally:
-            renderer.close()
-            detector.close()
+            lane.close()
     if draw_landmarks and found is not None:
-        radius = max(1, round(settings.resolution / 300))
-        for x, y in found[:, :2]:
-            cv2.circle(image, (round(x), round(y)), radius, DOT, -1, cv2.LINE_AA)
-    _, encoded = cv2.imencode(picture.suffix, image)
+        image = draw_points(image, found)
+    _, encoded = cv2.imencode(picture.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     try:
         picture.write_bytes(encoded.tobytes())
     except OSError as error:
         raise DatasetError(f"{picture}: cannot be written ({error.strerror})") from error
-    notes = "; ".join(prepared.notes)
+    notes = "; ".join(placement.notes)
     return ("landmarks found" if found is not None else "no face was found at this pose") + (
         f" ({notes})" if notes else ""
     )
+
+
+def draw_points(image: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """A copy of an image with a dot on each point. points: float [N, 2 or more], pixels."""
+    drawn = image.copy()
+    for x, y in points[:, :2]:
+        cv2.circle(drawn, (round(x), round(y)), max(1, round(len(image) / 300)), DOT, -1, cv2.LINE_AA)
+    return drawn

@@ -4,20 +4,20 @@
 One JSON object a line on stdin, one answer a line on stdout, in order. A request
 that fails is answered with ``{"error": "one line"}``. It ends when stdin closes.
 
-``{"op": "list", "heads": {...}, "cache": FOLDER}``
-    the heads of a source (the [heads] table of a configuration; parametric ones
-    are made in FOLDER): ``{"kind", "heads": [{"subject", "expression", "problems"}], "skipped": [...]}``
-``{"op": "place", "subject", "expression", "frame", "package": FILE.npz}``
+``{"op": "list", "config": {...}, "cache": FOLDER}``
+    the heads that a configuration names (its tables as in TOML; parametric heads are made in FOLDER):
+    ``{"kind", "heads": [{"subject", "expression", "problems"}], "skipped": [...]}``
+``{"op": "place", "config", "subject", "expression", "package": FILE.npz}``
     finds the head's face and writes it as frame U, mm, pivot at the origin:
     ``{"radius_mm", "vertices", "notes"}``
-``{"op": "pictures", "package": FILE.npz, "render": {...}, "distance_mm", "poses": [...],
+``{"op": "pictures", "config", "package": FILE.npz, "radius_mm", "poses": [...],
 "folder", "landmarks": bool, "sheet": columns}``
     renders poses as a build would: ``{"pictures": [path, ...], "landmarks": [[[x, y], ...] or null, ...]}``
     and, with columns, ``"sheet": path``, all of them in one picture with the landmarks drawn
-``{"op": "thumbnail", "subject", "expression", "frame", "pixels", "cache": FOLDER}``
+``{"op": "thumbnail", "config", "subject", "expression", "pixels", "cache": FOLDER}``
     a small picture of a head at pose zero, made once for the same files: ``{"picture": path}``
-``{"op": "plan", "poses": {...}, "file": FILE.npy}``
-    writes the poses of a [poses] table as float64 [N, 3], degrees: ``{"count": N}``
+``{"op": "plan", "config", "subject", "expression", "file": FILE.npy}``
+    writes the poses of a head as float64 [N, 3], degrees: ``{"count": N}``
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -37,17 +37,21 @@ import numpy as np
 
 from generator.dataset.format.files import file_sha256
 from generator.errors import HeadError, HeadturnError, UsageError
-from generator.execution.build.run import find_source
-from generator.execution.build.units import camera_distance
-from generator.execution.lanes.lane import Lane, LaneOptions
+from generator.execution.build.place import in_placing_order
+from generator.execution.build.sources import find_source
+from generator.execution.lanes.lane import Lane
+from generator.execution.lanes.options import LaneOptions
 from generator.execution.lanes.renderer import check_blender
 from generator.execution.lanes.scratch import scratch_folder
-from generator.execution.preview.picture import DOT
-from generator.heads.head import NEUTRAL, Head, HeadSource
+from generator.execution.preview.picture import draw_points
+from generator.heads.head import Head, HeadSource
 from generator.heads.package import save_package
-from generator.heads.read import read_mesh
-from generator.placing.face import Prepared
-from generator.plan.config import load_config
+from generator.heads.placement import Placement
+from generator.placing.rendering import read_image
+from generator.plan.config import BuildConfig, load_config
+from generator.plan.pose_plans import plan_poses
+from generator.plan.settings import Values
+from generator.plan.views import Pose, Views, plan_views
 
 
 class _Quiet:
@@ -60,58 +64,6 @@ class _Quiet:
     def note(self, text: str) -> None: ...
 
 
-class _PreviewLane(Lane):
-    """A lane that hands out what a build keeps to itself."""
-
-    def find(self, head: Head, frame: str) -> Prepared:
-        """Where a build would place the head, were it the first of its subject. Raises HeadError."""
-        return Prepared.from_dict(self._prepare([head], frame)["prepared"])
-
-    def package(self, head: Head, prepared: Prepared, target: Path) -> dict[str, Any]:
-        """Write the placed head, with textures that are made for it beside it."""
-        textures = target.with_suffix("")
-        shutil.rmtree(textures, ignore_errors=True)
-        textures.mkdir(parents=True)
-        mesh = read_mesh(head, textures, import_with_blender=self._renderer.import_mesh)
-        save_package(prepared.normalise(mesh), target)
-        return {
-            "radius_mm": prepared.radius_mm,
-            "vertices": len(mesh.vertices),
-            "notes": [*head.problems, *mesh.problems, *prepared.notes],
-        }
-
-    def pictures(
-        self,
-        package: str,
-        render: dict[str, Any],
-        distance_mm: float,
-        poses: list[list[float]],
-        folder: str,
-        landmarks: bool,
-        sheet: int = 0,
-    ) -> dict[str, Any]:
-        """See the module's docstring."""
-        settings = load_config(None, {"render": render}).render.settings()
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        paths, found, tiles = [], [], []
-        for index, frame in enumerate(self._renderer.render(Path(package), settings, distance_mm, poses)):
-            image = cv2.imread(str(frame))
-            frame.unlink()
-            points = self._detector.detect(cv2.cvtColor(image, cv2.COLOR_BGR2RGB)) if landmarks else None
-            found.append(None if points is None else np.round(points[:, :2], 2).tolist())
-            path = target / f"{index:03d}.png"
-            cv2.imwrite(str(path), image)
-            paths.append(str(path))
-            tiles.append(image if points is None else draw_points(image, points))
-        answer: dict[str, Any] = {"pictures": paths, "landmarks": found}
-        if sheet:
-            rows = [np.hstack(tiles[k : k + sheet]) for k in range(0, len(tiles), sheet)]
-            cv2.imwrite(str(target / "sheet.png"), np.vstack(rows))
-            answer["sheet"] = str(target / "sheet.png")
-        return answer
-
-
 class PreviewServer:
     """Answers requests; Blender and the detector start with the first that needs them."""
 
@@ -119,30 +71,29 @@ class PreviewServer:
         self._options = LaneOptions(scratch=str(scratch), blender=blender)
         self._scratch = scratch
         self._stack = stack
-        self._lane: _PreviewLane | None = None
+        self._lane: Lane | None = None
         self._source: HeadSource | None = None
-        self._placed: dict[tuple[str, str], Prepared] = {}
+        self._placed: dict[tuple[str, str, Any], Placement] = {}
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """The answer to one request. Raises HeadturnError."""
-        operation = request.pop("op")
-        if operation == "list":
-            return self._list(**request)
-        if operation == "place":
-            return self._place(**request)
-        if operation == "pictures":
-            return self._open_lane().pictures(**request)
-        if operation == "thumbnail":
-            return self._thumbnail(**request)
-        if operation == "plan":
-            return _draw_plan(**request)
-        raise UsageError(f"the preview server knows no {operation!r}: extension and host differ in version")
+        operations: dict[str, Callable[..., dict[str, Any]]] = {
+            "list": self._list,
+            "place": self._place,
+            "pictures": self._pictures,
+            "thumbnail": self._thumbnail,
+            "plan": _draw_plan,
+        }
+        operation = operations.get(name := request.pop("op"))
+        if operation is None:
+            raise UsageError(f"the preview server knows no {name!r}: extension and host differ in version")
+        config: Values = request.pop("config")
+        return operation(load_config(None, config), **request)
 
-    def _list(self, heads: dict[str, Any], cache: str) -> dict[str, Any]:
-        config = load_config(None, {"heads": heads})
+    def _list(self, config: BuildConfig, cache: str) -> dict[str, Any]:
         Path(cache).mkdir(parents=True, exist_ok=True)
         self._placed = {}
-        self._source = source = find_source(config.heads, Path(cache), _Quiet())
+        self._source = source = find_source(config, Path(cache), _Quiet())
         return {
             "kind": source.kind,
             "heads": [
@@ -152,33 +103,64 @@ class PreviewServer:
             "skipped": [f"{s.subject}/{s.expression}: {s.reason}" for s in source.skipped],
         }
 
-    def _place(self, subject: str, expression: str, frame: str, package: str) -> dict[str, Any]:
+    def _place(self, config: BuildConfig, subject: str, expression: str, package: str) -> dict[str, Any]:
         head = self._head(subject, expression)
-        return self._open_lane().package(head, self._prepared(subject, frame), Path(package))
+        placement = self._placement(config, subject)
+        mesh_problems, vertices = self._package(head, placement, Path(package))
+        return {
+            "radius_mm": placement.radius_mm,
+            "vertices": vertices,
+            "notes": [*head.problems, *mesh_problems, *placement.notes],
+        }
+
+    def _pictures(
+        self,
+        config: BuildConfig,
+        package: str,
+        radius_mm: float,
+        poses: list[Pose],
+        folder: str,
+        landmarks: bool,
+        sheet: int = 0,
+    ) -> dict[str, Any]:
+        views = plan_views(config.render, radius_mm, poses)
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        paths, found, tiles = [], [], []
+        for index, image in enumerate(self._render(Path(package), views)):
+            detector = self._open_lane().detector(config.landmarks) if landmarks else None
+            points = detector.detect(image) if detector else None
+            found.append(None if points is None else np.round(points[:, :2], 2).tolist())
+            path = target / f"{index:03d}.png"
+            _write(image, path)
+            paths.append(str(path))
+            tiles.append(image if points is None else draw_points(image, points))
+        answer: dict[str, Any] = {"pictures": paths, "landmarks": found}
+        if sheet:
+            rows = [np.hstack(tiles[k : k + sheet]) for k in range(0, len(tiles), sheet)]
+            _write(np.vstack(rows), target / "sheet.png")
+            answer["sheet"] = str(target / "sheet.png")
+        return answer
 
     def _thumbnail(
-        self, subject: str, expression: str, frame: str, pixels: int, cache: str
+        self, config: BuildConfig, subject: str, expression: str, pixels: int, cache: str
     ) -> dict[str, Any]:
         head = self._head(subject, expression)
         try:
             content = [file_sha256(file) for file in head.files]
         except OSError as error:
             raise HeadError(f"{head.name}: {error.filename}: {error.strerror}") from error
-        name = hashlib.sha256(json.dumps([content, frame, pixels]).encode()).hexdigest()[:32]
+        name = hashlib.sha256(json.dumps([content, config.poses.frame, pixels]).encode()).hexdigest()[:32]
         picture = Path(cache) / f"{name}.png"
         if not picture.exists():
-            prepared = self._prepared(subject, frame)
+            placement = self._placement(config, subject)
             package = self._scratch / "thumbnail.npz"
-            lane = self._open_lane()
-            lane.package(head, prepared, package)
-            config = load_config(None, {"render": {"resolution": pixels}})
-            distance = camera_distance(config, prepared)
-            zero = [[0.0, 0.0, 0.0]]
-            render = {"resolution": pixels}
-            made = lane.pictures(str(package), render, distance, zero, str(self._scratch), False)
+            self._package(head, placement, package)
+            small = load_config(None, {"render": {"resolution": pixels}}).render
+            [image] = self._render(package, plan_views(small, placement.radius_mm, [(0.0, 0.0, 0.0)]))
             picture.parent.mkdir(parents=True, exist_ok=True)
             half = picture.with_name(f".{os.getpid()}-{picture.name}")  # another Blender may write it too
-            shutil.copyfile(made["pictures"][0], half)
+            _write(image, half)
             os.replace(half, picture)
         return {"picture": str(picture)}
 
@@ -189,46 +171,45 @@ class PreviewServer:
                 return head
         raise UsageError(f"there is no {subject}/{expression}: list the heads again")
 
-    def _prepared(self, subject: str, frame: str) -> Prepared:
-        """Where a subject stands; found once."""
-        key = (subject, frame)
+    def _placement(self, config: BuildConfig, subject: str) -> Placement:
+        """Where a subject stands, as a build finds it; found once."""
+        key = (subject, config.poses.frame, config.landmarks)
         if key not in self._placed:
             assert self._source is not None, "a head that was found has a source"
             heads = [head for head in self._source.heads if head.subject == subject]
-            heads.sort(key=lambda head: (head.expression != NEUTRAL, head.expression))
-            self._placed[key] = self._find(heads, frame)
+            placer = self._open_lane().placer(config.landmarks)
+            self._placed[key] = placer.stand(in_placing_order(heads), config.poses.frame)
         return self._placed[key]
 
-    def _find(self, heads: list[Head], frame: str) -> Prepared:
-        """As a build places a subject: by its neutral face, or the first that shows one."""
-        reason = ""
-        for head in heads:
-            try:
-                return self._open_lane().find(head, frame)
-            except HeadError as error:
-                reason = reason or str(error)
-        raise HeadError(reason)
+    def _package(self, head: Head, placement: Placement, target: Path) -> tuple[tuple[str, ...], int]:
+        """Write the placed head, with textures that are made for it beside it: (problems, vertices)."""
+        textures = target.with_suffix("")
+        shutil.rmtree(textures, ignore_errors=True)
+        textures.mkdir(parents=True)
+        mesh = self._open_lane().read(head, textures)
+        save_package(placement.normalise(mesh), target)
+        return mesh.problems, len(mesh.vertices)
 
-    def _open_lane(self) -> _PreviewLane:
+    def _render(self, package: Path, views: Views) -> Iterator[np.ndarray]:
+        return map(read_image, self._open_lane().renderer.render(package, views))
+
+    def _open_lane(self) -> Lane:
         if self._lane is None:
-            self._lane = _PreviewLane(self._options)
+            self._lane = Lane(self._options)
             self._stack.callback(self._lane.close)
         return self._lane
 
 
-def _draw_plan(poses: dict[str, Any], file: str) -> dict[str, Any]:
-    plan = load_config(None, {"poses": poses}).poses.plan()
+def _draw_plan(config: BuildConfig, subject: str, expression: str, file: str) -> dict[str, Any]:
+    plan = plan_poses(config, [(subject, expression)]).of(subject, expression)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     np.save(file, plan.angles_deg)
     return {"count": len(plan)}
 
 
-def draw_points(image: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """A copy of a BGR image with a dot on each point. points: float [N, 2 or more], pixels."""
-    drawn = image.copy()
-    for x, y in points[:, :2]:
-        cv2.circle(drawn, (round(x), round(y)), max(1, len(image) // 300), DOT, -1, cv2.LINE_AA)
-    return drawn
+def _write(image: np.ndarray, path: Path) -> None:
+    """An RGB image as a file."""
+    cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
 
 
 def answers(server: PreviewServer, lines: Iterator[str]) -> Iterator[dict[str, Any]]:

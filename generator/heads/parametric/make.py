@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError, UsageError
-from generator.heads.head import NEUTRAL
+from generator.heads.head import NEUTRAL, Made, Maker, Wish
 from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
 from generator.heads.parametric.compose import HeadShape, head_shape, head_vertices
 from generator.heads.parametric.curtain import paint_curtain
@@ -162,3 +162,21 @@ def _prepare(out: Path) -> None:
         name = entry.name.removeprefix(".").removesuffix(".tmp")
         if not (entry.is_dir() and _HEAD_NAME.fullmatch(name)):
             raise UsageError(f"{out}: holds {entry.name}, not a parametric head; choose an empty folder")
+
+
+def _make(folder: Path, wish: Wish, made: Callable[[], None]) -> Made:
+    if wish.argument:
+        raise UsageError(f"--heads parametric:{wish.argument}: parametric heads take no argument")
+    make_heads(
+        folder,
+        count=wish.count,
+        seed=wish.seed,
+        expressions=wish.sampled_expressions,
+        progress=lambda _: made(),
+        keep=True,
+    )
+    sampled = (expression_name(number) for number in range(1, wish.sampled_expressions + 1))
+    return Made(tuple(head_name(wish.seed, k) for k in range(wish.count)), (NEUTRAL, *sampled))
+
+
+MAKER = Maker(_make)

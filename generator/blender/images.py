@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Views of a head as image files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from generator.blender import compat
+from generator.blender.crop import Backdrop, Box, Outline
+from generator.blender.passes import render_passes
+from generator.blender.stage import Stage
+from generator.heads.mesh import HeadMesh
+from generator.plan.views import View
+
+
+class Images:
+    """Renders views of one head.
+
+    Replaces everything in Blender by the head. mesh: frame U, mm, pivot at the origin.
+    threads: of Cycles; 0 lets Blender take every core.
+    """
+
+    def __init__(self, mesh: HeadMesh, *, threads: int = 0) -> None:
+        self._mesh, self._threads = mesh, threads
+        self._outline = Outline(mesh.vertices)
+        self._stage: Stage | None = None
+        self._knows_uv = False
+        self._empty: Any = None  # what an image without the head depends on, of the last view
+        self._alike = 0  # views in a row for which that is the same
+        self._backdrop: Backdrop | None = None
+
+    def render(self, view: View, path: Path) -> None:
+        """Render a view into path: .bmp (sRGB) or .exr (linear float32).
+
+        Both are lossless and quick to write; what is kept of an image is encoded by
+        the host, without the times and dates that Blender puts into a PNG. Of a
+        .bmp only the pixels the head can cover are rendered: the same bytes in less time.
+        """
+        stage = self._show(view)
+        self._knows_uv = False
+        empty = (view.camera.width, view.camera.height, view.look.preset, view.look.background)
+        self._alike = self._alike + 1 if empty == self._empty else 1
+        if empty != self._empty:
+            self._empty, self._backdrop = empty, None
+        # The backdrop costs as much as an image, so it is made for the second.
+        if path.suffix != ".bmp" or self._alike == 1:
+            _render(path)
+            return
+        if self._backdrop is None:
+            stage.head.hide_render = True
+            _render(path)
+            stage.head.hide_render = False
+            self._backdrop = Backdrop(path)
+        box = self._outline.box(view.pose, view.camera)
+        if box is not None:
+            _render(path, box)
+        self._backdrop.lay(path, box)
+
+    def render_passes(self, view: View, path: Path, passes: Sequence[str]) -> None:
+        """Render passes of a view; see :mod:`generator.blender.passes`."""
+        stage = self._show(view)
+        if "uv" in passes and not self._knows_uv:
+            # Persistent data keeps the mesh as pictures need it, which is without its UV map.
+            stage.head.data.update_tag()
+            self._knows_uv = True
+        render_passes(path, stage.head, passes)
+
+    def _show(self, view: View) -> Stage:
+        if self._stage is None or self._stage.preset != view.look.preset:
+            self._stage = None
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            self._stage = Stage(bpy.context.scene, self._mesh, view.look.preset, threads=self._threads)
+        self._stage.show(view)
+        return self._stage
+
+
+def _render(path: Path, box: Box | None = None) -> None:
+    """Render the scene as it stands into path, or the pixels of a box alone."""
+    render = bpy.context.scene.render
+    settings = render.image_settings
+    compat.use_still_images(settings)
+    if path.suffix == ".exr":
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+    elif path.suffix == ".bmp":
+        settings.file_format, settings.color_mode = "BMP", "RGB"
+    else:
+        raise ValueError(f"{path}: images are .bmp or .exr")
+    render.use_border = render.use_crop_to_border = box is not None
+    if box is not None:
+        # Blender cuts to whole pixels; a quarter more keeps rounding from losing one.
+        left, right = ((edge + 0.25) / render.resolution_x for edge in box[:2])
+        bottom, top = ((edge + 0.25) / render.resolution_y for edge in box[2:])
+        render.border_min_x, render.border_max_x = left, right
+        render.border_min_y, render.border_max_y = bottom, top
+    render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One head before a camera and a light: built once a head, set once a view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from generator.blender.light import Light, build_light
+from generator.blender.materials import UV_MAP, VERTEX_COLORS, build_material
+from generator.geometry.camera import SENSOR_MM, Camera
+from generator.geometry.rotation import (
+    BLENDER_FROM_GRAPHICS,
+    blender_rotation,
+    rotation_from_angles,
+)
+from generator.heads.mesh import HeadMesh
+from generator.plan.settings import Look
+from generator.plan.views import View
+
+METRES = 1e-3
+"""Blender units (metres) in a millimetre."""
+
+QUALITY_BOUNCES = 2
+
+
+class Stage:
+    """A head, its light and its camera in an empty scene.
+
+    Parameters
+    ----------
+    mesh: frame U, mm, pivot at the origin.
+    preset: of :class:`generator.plan.settings.Look`; another one needs another stage.
+    threads: of Cycles; 0 lets Blender take every core.
+
+    Raises FileNotFoundError or RuntimeError if a texture cannot be read.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, mesh: HeadMesh, preset: str, *, threads: int = 0) -> None:
+        self.scene, self.preset = scene, preset
+        self.head = _build_head(mesh, preset)
+        scene.collection.objects.link(self.head)
+        if preset == "fast":
+            # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
+            scene.collection.objects.link(_unseen_twin(self.head))
+        self._light: Light = build_light(scene, preset, list(self.head.data.materials))
+        self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        scene.collection.objects.link(self._camera)
+        scene.camera = self._camera
+        _set_render(scene, preset, threads)
+        self._seen_by: Camera | None = None
+        self._look: Look | None = None
+
+    def show(self, view: View) -> None:
+        """Set pose, camera and look. What stays as it was is not touched. ValueError for another preset."""
+        if view.look.preset != self.preset:
+            raise ValueError(f"a stage for {self.preset} cannot show {view.look.preset}")
+        turn(self.head, view.pose)
+        if view.camera != self._seen_by:
+            set_camera(self.scene, self._camera, view.camera)
+            self._seen_by = view.camera
+        if view.look != self._look:
+            self._light.set(view.look)
+            self.scene.cycles.samples = view.look.cycles_samples
+            self._look = view.look
+
+
+def turn(head: bpy.types.Object, ypr_deg: Sequence[float]) -> None:
+    """Set the head's rotation to R_B of (yaw, pitch, roll) in degrees."""
+    rotation = blender_rotation(rotation_from_angles(np.asarray(ypr_deg, dtype=np.float64)))
+    head.matrix_world = Matrix(rotation.tolist()).to_4x4()
+
+
+def set_camera(scene: bpy.types.Scene, thing: bpy.types.Object, camera: Camera) -> None:
+    """Make Blender's camera see what a camera of ours sees, to the last digit of float32."""
+    data, distance = thing.data, camera.distance_mm
+    data.sensor_fit = "HORIZONTAL"
+    data.sensor_width = SENSOR_MM
+    data.lens = camera.lens_mm
+    data.type = "PERSP"
+    if camera.projection == "orthographic":
+        data.type = "ORTHO"
+        data.ortho_scale = camera.view_mm * METRES
+    # Blender counts shifts in widths of the image, and turns the camera's side to where it shifts.
+    x, y = camera.centre_px.tolist()
+    data.shift_x = 0.5 - x / camera.width
+    data.shift_y = (y - camera.height / 2.0) / camera.width
+    data.clip_start = 0.01 * distance * METRES
+    data.clip_end = 100 * distance * METRES
+    # A Blender camera looks along its own -z; a quarter turn about x makes that +y, into the scene.
+    thing.matrix_world = Matrix.Translation((0, -distance * METRES, 0)) @ Matrix.Rotation(np.pi / 2, 4, "X")
+    scene.render.resolution_x, scene.render.resolution_y = camera.width, camera.height
+
+
+def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
+    """A second user of the head's mesh that no ray can hit.
+
+    Cycles bakes the transform of an object into a mesh that it has to itself, and
+    builds the ray-casting tree anew at every pose. With a second user it keeps the tree.
+    """
+    twin = bpy.data.objects.new("twin", head.data)
+    twin.visible_camera = twin.visible_diffuse = twin.visible_glossy = False
+    twin.visible_transmission = twin.visible_shadow = False
+    # Visible to nothing at all it would be left out; nothing here scatters in a volume.
+    twin.visible_volume_scatter = True
+    return twin
+
+
+def _build_head(mesh: HeadMesh, preset: str) -> bpy.types.Object:
+    made = bpy.data.meshes.new("head")
+    faces = len(mesh.triangles)
+    vertices = (mesh.vertices * METRES) @ BLENDER_FROM_GRAPHICS.T
+    made.vertices.add(len(vertices))
+    made.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    made.loops.add(3 * faces)
+    made.loops.foreach_set("vertex_index", mesh.triangles.astype(np.int32).ravel())
+    made.polygons.add(faces)
+    made.polygons.foreach_set("loop_start", np.arange(0, 3 * faces, 3, dtype=np.int32))
+    made.polygons.foreach_set("material_index", mesh.material_index.astype(np.int32))
+    made.polygons.foreach_set("use_smooth", np.ones(faces, dtype=bool))
+    if mesh.uv is not None:
+        layer = made.uv_layers.new(name=UV_MAP)
+        layer.uv.foreach_set("vector", mesh.uv.astype(np.float32).ravel())
+    if mesh.vertex_colors is not None:
+        colors = np.ones((len(vertices), 4), dtype=np.float32)
+        colors[:, :3] = mesh.vertex_colors
+        attribute = made.color_attributes.new(VERTEX_COLORS, "BYTE_COLOR", "POINT")
+        attribute.data.foreach_set("color_srgb", colors.ravel())
+    made.update(calc_edges=True)
+    for material in mesh.materials:
+        made.materials.append(
+            build_material(material, preset, has_vertex_colors=mesh.vertex_colors is not None)
+        )
+    return bpy.data.objects.new("head", made)
+
+
+def _set_render(scene: bpy.types.Scene, preset: str, threads: int) -> None:
+    """What is the same for every view."""
+    render = scene.render
+    render.engine = "CYCLES"
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
+    render.use_file_extension = False
+    render.use_persistent_data = True
+    render.use_compositing = render.use_sequencer = False
+    render.dither_intensity = 0.0
+    render.threads_mode = "FIXED" if threads else "AUTO"
+    if threads:
+        render.threads = threads
+
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.seed = 0
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.use_light_tree = False
+    bounces = 0 if preset == "fast" else QUALITY_BOUNCES
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
+    cycles.transmission_bounces = cycles.volume_bounces = 0
+    cycles.transparent_max_bounces = 8
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+
+    view = scene.view_settings
+    scene.display_settings.display_device = "sRGB"
+    view.view_transform, view.look = "Standard", "None"
+    view.exposure, view.gamma = 0.0, 1.0

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings of the first release, which digested all of them; later ones count where they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from generator.plan.settings import ROWS, Values, all_settings, beyond_defaults, plain
+
+FIRST_SETTINGS = {
+    "render": (
+        *("resolution", "lens_mm", "distance_mm", "margin", "preset", "samples", "light_yaw_deg"),
+        *("light_pitch_deg", "ambient", "background", "projection"),
+    ),
+    "landmarks": ("detector", "min_confidence"),
+    "dataset": ("images", "image_format", "passes", "validation", "unit_size"),
+}
+"""Of the sections that do not choose rows."""
+
+
+def later_settings(values: Values) -> dict[str, Any]:
+    """Values by "section.key" of settings that the first release did not have, where they are used."""
+    return beyond_defaults(
+        values, lambda s: s.section not in ROWS and s.key not in FIRST_SETTINGS.get(s.section, ())
+    )
+
+
+def common_values(configuration: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """What all parts of a dataset share: its configuration without heads and poses, which may grow.
+
+    A later setting that has its default is left out, so that parts which were built before it agree.
+    """
+    defaults = {known.name: plain(known.default) for known in all_settings()}
+
+    def counts(section: str, key: str, value: Any) -> bool:
+        if key in FIRST_SETTINGS.get(section, ()):
+            return True
+        return f"{section}.{key}" not in defaults or plain(value) != defaults[f"{section}.{key}"]
+
+    return {
+        section: {key: value for key, value in table.items() if counts(section, key, value)}
+        if isinstance(table, Mapping)
+        else table
+        for section, table in configuration.items()
+        if section not in ROWS
+    }

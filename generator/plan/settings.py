@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every setting of a build, once: what it is, what it may be, what it is called.
+
+A section of the configuration is a class here, a setting is a field of it. Validation, TOML, the
+options of the command line, Blender's properties and panel, docs/configuration.md and the names of
+units follow from these classes; see docs/architecture.md. stdlib only: Blender imports it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Literal, TypeVar, cast, get_type_hints
+
+from generator import registries
+
+T = TypeVar("T")
+
+PARAMETRIC = "parametric"
+"""The head source that is made on the spot."""
+
+PRESET_SAMPLES = {"fast": 1, "quality": 4}
+"""Cycles samples a pixel of each preset, where none are asked for."""
+
+Projection = Literal["perspective", "orthographic"]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of the values a setting may have. label, help: for people; the label follows from the value."""
+
+    value: str
+    help: str = ""
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """What people read."""
+        return self.label or self.value.replace("_", " ").capitalize()
+
+
+@dataclass(frozen=True)
+class Info:
+    """What is known of a setting besides its name, type and default.
+
+    help       one sentence without its full stop
+    unit       of the value, such as "mm"; "" for none
+    low, high, above   smallest, largest, and "more than", of each number
+    choices    of texts; none where everything goes
+    flag       of the command line. Settings of one section that share a flag are given together, with
+               commas; settings of several sections that share one all get its value. "" for none
+    label      in Blender's panel; "" leaves it out of the panel
+    grows      it chooses rows and does not change what is in one, so a dataset may grow along it
+    content    it decides pixels or labels, and enters the name of a unit where it is not the default (what
+               [heads] and [poses] decide is in the head's files, its placement and the poses)
+    path       of a file or folder; a relative one counts from the configuration file
+    """
+
+    help: str
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    above: float | None = None
+    choices: tuple[Choice, ...] | Callable[[], tuple[Choice, ...]] = ()
+    flag: str | None = None
+    label: str = ""
+    grows: bool = False
+    content: bool = True
+    path: bool = False
+
+
+def setting(default: T, help: str, **info: Any) -> T:
+    """A field of a section. info: see :class:`Info`."""
+    return cast(T, field(default=default, metadata={"info": Info(help, **info)}))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting as others see it. kind: its type, such as ``float`` or ``tuple[str, ...]``."""
+
+    section: str
+    key: str
+    kind: Any
+    default: Any
+    info: Info
+
+    @property
+    def name(self) -> str:
+        """Such as "render.lens_mm"."""
+        return f"{self.section}.{self.key}"
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """The values it may have; none where everything goes."""
+        found = self.info.choices
+        return found() if callable(found) else found
+
+    @property
+    def flag(self) -> str:
+        """Its option of the command line, "" if it has none: the key without its unit."""
+        if self.info.flag is not None:
+            return self.info.flag
+        return "--" + self.key.removesuffix("_mm").removesuffix("_deg").replace("_", "-")
+
+
+_AXES = tuple(Choice(sign + axis, label=sign + axis) for axis in "XYZ" for sign in "+-")
+
+
+def _registered(registry: Any) -> Callable[[], tuple[Choice, ...]]:
+    return lambda: tuple(Choice(name) for name in registry)
+
+
+@dataclass(frozen=True)
+class Heads:
+    """Which heads."""
+
+    source: str = setting(
+        PARAMETRIC, 'A head source, or "parametric": heads made on the spot from MakeHuman\'s CC0 data',
+        flag="--heads", label="Heads", path=True,
+    )  # fmt: skip
+    count: int = setting(3, "Parametric heads to make", low=1, label="Heads", grows=True)
+    seed: int = setting(
+        0, "The same seed makes the same heads, and draws the same random poses",
+        low=0, label="Seed",
+    )  # fmt: skip
+    sampled_expressions: int = setting(
+        0, "Sampled expressions a parametric head, besides the neutral face",
+        low=0, label="Expressions", grows=True,
+    )  # fmt: skip
+    subjects: tuple[str, ...] | None = setting(
+        None, "Only this subject; repeatable",
+        flag="--subject", label="Subjects", grows=True,
+    )  # fmt: skip
+    expressions: tuple[str, ...] | None = setting(
+        None, "Only this expression; repeatable",
+        flag="--expression", label="Expressions", grows=True,
+    )  # fmt: skip
+    license: str | None = setting(None, "Licence of heads that do not say")
+    redistributable: bool | None = setting(None, "May renders of heads that do not say be published?")
+    units: str | None = setting(
+        None, "Unit of the meshes; found from the size of the face where it is not given",
+        choices=(
+            Choice("um", label="Micrometres"), Choice("mm", label="Millimetres"),
+            Choice("cm", label="Centimetres"), Choice("dm", label="Decimetres"), Choice("m", label="Metres"),
+        ),
+        label="Units",
+    )  # fmt: skip
+    up: str | None = setting(
+        None, "Axis of the meshes' crown, such as +Y; found from the face where it is not given",
+        choices=_AXES, label="Up",
+    )  # fmt: skip
+    forward: str | None = setting(
+        None, "Axis of the meshes' nose, such as +Z; found from the face where it is not given",
+        choices=_AXES, label="Forward",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Which poses; see generator.plan.poses. A range is start, stop and step, or low and high."""
+
+    kind: str = setting(
+        "grid", "grid, uniform:N, sobol:N, or a CSV file",
+        choices=(
+            Choice("grid", "Every combination of yaw, pitch and roll"),
+            Choice("uniform", "Random poses, independent of each other"),
+            Choice("sobol", "Random poses, evenly spread"),
+            Choice("csv", "The poses of a table", label="CSV file"),
+        ),
+        flag="--poses", label="Poses", grows=True,
+    )  # fmt: skip
+    yaw: tuple[float, ...] = setting(
+        (-50.0, 50.0, 10.0), "START,STOP,STEP of the grid, or LOW,HIGH of random poses",
+        unit="degrees", label="Yaw", grows=True,
+    )  # fmt: skip
+    pitch: tuple[float, ...] = setting(
+        (-40.0, 40.0, 10.0), "As --yaw",
+        unit="degrees", label="Pitch", grows=True,
+    )  # fmt: skip
+    roll: tuple[float, ...] = setting(
+        (-30.0, 30.0, 10.0), "As --yaw",
+        unit="degrees", label="Roll", grows=True,
+    )  # fmt: skip
+    count: int = setting(
+        693,
+        "Random poses a head",
+        low=1,
+        flag="--poses",
+        label="Count",
+        grows=True,
+    )
+    seed: int = setting(0, "The same seed draws the same poses", low=0, label="Seed", grows=True)
+    path: str | None = setting(
+        None, "CSV file with the columns yaw_deg, pitch_deg, roll_deg",
+        flag="--poses", label="File", grows=True, path=True,
+    )  # fmt: skip
+    same: bool = setting(
+        False, "Every head gets the same random poses, instead of a draw of its own",
+        flag="--same-poses", label="Same poses for every head", grows=True,
+    )  # fmt: skip
+    frame: str = setting(
+        "source", "Where pose zero is",
+        choices=(
+            Choice("source", "The mesh's own axes", label="As modelled"),
+            Choice("canonical", "Every head is levelled to the same face first", label="Levelled"),
+        ),
+        label="Pose zero",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Lens:
+    """From where an image is taken."""
+
+    resolution: int = setting(
+        256, "Side of the square images", unit="pixels", low=16, high=4096, label="Resolution"
+    )
+    lens_mm: float = setting(
+        85.0, "Focal length on a 36 mm sensor", unit="mm", low=10, high=1000, label="Lens"
+    )
+    projection: Projection = setting(
+        "perspective", "How rays meet the camera",
+        choices=(
+            Choice("perspective", "A real camera"),
+            Choice("orthographic", "Parallel rays, the scale of the lens at the pivot"),
+        ),
+        label="Projection",
+    )  # fmt: skip
+    distance_mm: float | None = setting(
+        None, "Camera to the head's pivot; without it the camera stands where each head just fits",
+        unit="mm", low=100, high=100_000, label="Distance",
+    )  # fmt: skip
+    margin: float = setting(
+        1.05, "Room around a head that is framed; 1 touches the border", low=0.5, high=10, label="Margin",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Look:
+    """What an image looks like, besides head, pose and camera. Of one image: part of a View."""
+
+    preset: str = setting(
+        "fast", "How light is computed",
+        choices=(
+            Choice("fast", "Light computed from the normal: no noise, quick"),
+            Choice("quality", "Path traced, soft shadows"),
+        ),
+        label="Look",
+    )  # fmt: skip
+    samples: int | None = setting(
+        None, "Cycles samples a pixel; the preset's own where it is not given", low=1, high=4096,
+        label="Samples",
+    )  # fmt: skip
+    light_yaw_deg: float = setting(
+        25.0, "Where the key light stands, seen from the head: above zero towards image left",
+        unit="degrees", low=-180, high=180, flag="--light", label="Light yaw",
+    )  # fmt: skip
+    light_pitch_deg: float = setting(
+        35.0, "Height of the key light, seen from the head",
+        unit="degrees", low=-90, high=90, flag="--light", label="Light pitch",
+    )  # fmt: skip
+    ambient: float = setting(
+        0.35, "Share of the light that comes from everywhere", low=0, high=1, label="Ambient"
+    )
+    background: tuple[float, float, float] = setting(
+        (0.5, 0.5, 0.5), "R,G,B of what is behind the head, sRGB between 0 and 1", low=0, high=1,
+        label="Background",
+    )  # fmt: skip
+
+    @property
+    def cycles_samples(self) -> int:
+        """Samples a pixel: those asked for, or the preset's."""
+        return self.samples or PRESET_SAMPLES[self.preset]
+
+
+@dataclass(frozen=True)
+class Render(Look, Lens):
+    """How images are made: the lens they are seen through, and their look."""
+
+    @property
+    def look(self) -> Look:
+        """The look alone."""
+        return Look(**{f.name: getattr(self, f.name) for f in fields(Look)})
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """Who finds the landmarks."""
+
+    detector: str = setting("mediapipe", "Which detector", choices=_registered(registries.DETECTORS))
+    min_confidence: float = setting(
+        0.5, "How sure the detector must be that there is a face", above=0, high=1,
+        label="Min. confidence",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """What is written."""
+
+    images: str = setting(
+        "files", "Where the images go",
+        choices=(
+            Choice("files", "Image files beside the tables"),
+            Choice("embedded", "Images inside the tables"),
+            Choice("none", "Landmarks and poses only"),
+        ),
+        label="Images",
+    )  # fmt: skip
+    image_format: str = setting(
+        "png", "Of the images",
+        choices=(Choice("png", "Exact", label="PNG"), Choice("jpg", "Smaller", label="JPEG")),
+        label="Format",
+    )  # fmt: skip
+    passes: tuple[str, ...] = setting(
+        (), "OpenEXR passes, with commas", choices=_registered(registries.PASSES)
+    )
+    validation: float = setting(
+        0.0, "Share of the subjects that go to the validation split", low=0, high=1, label="Validation",
+        content=False,
+    )  # fmt: skip
+    unit_size: int = setting(
+        100, "Poses that are rendered and written together", low=1, high=100_000, content=False
+    )
+
+
+ROWS = ("heads", "poses")
+"""The sections that choose rows."""
+
+SECTIONS: dict[str, type] = {
+    "heads": Heads,
+    "poses": Poses,
+    "render": Render,
+    "landmarks": Landmarks,
+    "dataset": Dataset,
+}
+"""The tables of a configuration, in their order."""
+
+Values = dict[str, dict[str, Any]]
+"""section -> key -> plain value."""
+
+
+def all_settings() -> Iterator[Setting]:
+    """Every setting, section by section."""
+    for name, section in SECTIONS.items():
+        yield from section_settings(name, section)
+
+
+def section_settings(name: str, section: type) -> Iterator[Setting]:
+    """The settings of one section."""
+    kinds = get_type_hints(section)
+    for found in fields(section):
+        default = found.default if found.default is not MISSING else None
+        yield Setting(name, found.name, kinds[found.name], default, found.metadata["info"])
+
+
+def with_defaults(values: Values) -> Values:
+    """Values of every setting: those given, else the default."""
+    every: Values = {name: {} for name in SECTIONS}
+    for known in all_settings():
+        every[known.section][known.key] = values.get(known.section, {}).get(known.key, known.default)
+    return every
+
+
+def beyond_defaults(values: Values, wanted: Callable[[Setting], bool]) -> dict[str, Any]:
+    """Values by "section.key" of the wanted settings that are not the default.
+
+    So a setting that is added later changes nothing where it is not used. values: plain, as JSON has them.
+    """
+    found = {}
+    for known in all_settings():
+        value = values.get(known.section, {}).get(known.key, known.default)
+        if wanted(known) and plain(value) != plain(known.default):
+            found[known.name] = plain(value)
+    return found
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: lists for tuples."""
+    return [plain(item) for item in value] if isinstance(value, (list, tuple)) else value
