@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from downstream_hpe.decomposition import PAPER_RANKS, decompose
-from downstream_hpe.normalise import FEATURES, normalise
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.tensor import ArrayTensor
+from downstream_hpe.geometry.face_mesh import FEATURES
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.manifold.decomposition import PAPER_RANKS, decompose
+from downstream_hpe.manifold.slabs import ArrayTensor
 
 AXES = (np.arange(-50, 51, 10), np.arange(-40, 41, 10), np.arange(-30, 31, 10))
 NOISE = 0.01

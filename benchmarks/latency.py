@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from downstream_hpe.export import export_int8, export_onnx
-from downstream_hpe.networks import PoseNetwork, Weights
-from downstream_hpe.predictor import MODELS, Predictor
-from downstream_hpe.training import RECIPES
+from downstream_hpe.networks.export import export_int8, export_onnx
+from downstream_hpe.networks.pose_network import PoseNetwork
+from downstream_hpe.networks.recipe import RECIPES
+from downstream_hpe.networks.weights import Weights
+from downstream_hpe.prediction.predictor import MODELS, Predictor
 
 RUNS = 2000
 LIMIT_MS = 0.1

@@ -13,9 +13,9 @@ from scipy.optimize import minimize
 sys.path.insert(0, str(Path(__file__).parent))
 from decompose import AXES, SyntheticTensor
 
-from downstream_hpe.decomposition import decompose
-from downstream_hpe.manifold import fit_manifolds
-from downstream_hpe.reconstruction import ReconstructionEstimator
+from downstream_hpe.manifold.cosines import fit_manifolds
+from downstream_hpe.manifold.decomposition import decompose
+from downstream_hpe.manifold.reconstruction import ReconstructionEstimator
 
 BATCHED, SINGLE, POWELL = 1024, 50, 10
 

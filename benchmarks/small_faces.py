@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from downstream_hpe.detector import FaceDetector
-from downstream_hpe.metrics import geodesic_errors
-from downstream_hpe.pictures import read_bgr
-from downstream_hpe.rotation import fit_rotation
+from downstream_hpe.geometry.metrics import geodesic_errors
+from downstream_hpe.geometry.rotation import fit_rotation
+from downstream_hpe.prediction.detector import FaceDetector
+from downstream_hpe.prediction.pictures import read_bgr
 
 SHARES = (0.5, 0.35, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06)
 PICTURES = 60

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a dataset to a model folder, and from a model to a table of errors.
+"""From a dataset to a model folder.
 
 A model folder holds tensor.safetensors (core, factors, manifolds, mean face), network.safetensors,
 model.onnx (raw landmarks to pose), model.json (settings, data, results) and manifolds.png.
@@ -15,34 +15,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from downstream_hpe.confidence import Confidence, calibrate, level_faces
-from downstream_hpe.decomposition import PAPER_RANKS, Ranks, decompose
 from downstream_hpe.errors import DataError, UsageError
-from downstream_hpe.evaluation import (
-    ANGLES,
-    Estimator,
-    Evaluation,
-    constant_zero,
-    evaluate,
-    rigid_fit,
-    split_subjects,
-    within_bounds,
-)
-from downstream_hpe.manifold import MIN_SAMPLES, plot_manifolds
-from downstream_hpe.model import Progress, TensorModel
-from downstream_hpe.normalise import Normalisation, normalise
-from downstream_hpe.pose_zero import common_zero
-from downstream_hpe.predictor import MODEL_FILE, Predictor
-from downstream_hpe.reference import mean_face
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.tables import Rows, read_rows, subjects_by_split
-from downstream_hpe.tensor import Holes, open_tensor
+from downstream_hpe.evaluation.estimators import compare, estimators
+from downstream_hpe.evaluation.reference import mean_face
+from downstream_hpe.evaluation.scores import Evaluation, summary, within_bounds
+from downstream_hpe.geometry.normalise import Normalisation, normalise
+from downstream_hpe.geometry.rotation import ANGLES, rotation_from_angles
+from downstream_hpe.manifold.cosines import MIN_SAMPLES
+from downstream_hpe.manifold.decomposition import PAPER_RANKS, Ranks, decompose
+from downstream_hpe.manifold.plot import plot_manifolds
+from downstream_hpe.manifold.tensor_model import TENSOR_FILE, TensorModel
+from downstream_hpe.networks.confidence import Confidence, calibrate, level_faces
+from downstream_hpe.prediction.predictor import MODEL_FILE
+from downstream_hpe.tables.missing import Missing
+from downstream_hpe.tables.pose_zero import common_zero
+from downstream_hpe.tables.rows import Rows, read_rows
+from downstream_hpe.tables.splits import split_subjects, subjects_by_split
+from downstream_hpe.tables.tensor import open_tensor
 
 if TYPE_CHECKING:
-    from downstream_hpe.networks import Weights
+    from downstream_hpe.networks.training import Progress
+    from downstream_hpe.networks.weights import Weights
 
-TENSOR_FILE = "tensor.safetensors"
-NETWORK_FILE = "network.safetensors"
 CARD_FILE = "model.json"
 PLOT_FILE = "manifolds.png"
 
@@ -56,7 +50,7 @@ class FitSettings:
     recipe: str = "continuous"
     extra: tuple[str, ...] = ()
     ranks: Ranks = PAPER_RANKS
-    holes: Holes = "refuse"
+    missing: Missing = "fail"
     normalisation: Normalisation = "rms"
     refinements: int = 2
     validation: float = 0.1
@@ -93,9 +87,10 @@ def fit(
     # Only a fit needs torch and onnx.
     import torch
 
-    from downstream_hpe.export import export_onnx
-    from downstream_hpe.networks import Weights
-    from downstream_hpe.training import recipe_named, train
+    from downstream_hpe.networks.export import export_onnx
+    from downstream_hpe.networks.recipe import recipe_named
+    from downstream_hpe.networks.training import train
+    from downstream_hpe.networks.weights import NETWORK_FILE, Weights
 
     recipe = recipe_named(settings.recipe, settings.epochs, settings.seed)
     if settings.extra and not recipe.continuous:
@@ -144,7 +139,7 @@ def _tensor_model(
     """Decomposition and manifolds of the grid, written to the folder; and their part of the card."""
     tensor = open_tensor(
         dataset,
-        holes=settings.holes,
+        missing=settings.missing,
         normalisation=settings.normalisation,
         subjects=trained,
         expression=settings.expression,
@@ -201,41 +196,6 @@ def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:
     rotation = rotation_from_angles(ypr_deg)
     faces = level_faces(mine.landmarks, mine.rotation, weights.normalisation)
     return calibrate(faces, weights.range_deg, features, ypr_deg, rotation, theirs.rotation)
-
-
-def estimators(folder: Path, reference: np.ndarray | None = None) -> dict[str, Estimator]:
-    """The baselines and the model of a folder, by name.
-
-    reference: float [468, 3], frame C, for the rigid fit; None: the mean face of the training set.
-    """
-    model = TensorModel.load(folder / TENSOR_FILE)
-    predictor = Predictor.load(folder)
-    reconstruction = model.estimator()
-    face, of = (model.reference, "mean face") if reference is None else (reference, "reference face")
-    return {
-        "constant zero": constant_zero,
-        f"rigid fit to {of}": rigid_fit(face),
-        "reconstruction": lambda landmarks: reconstruction.from_landmarks(landmarks).ypr_deg,
-        "encoder + heads": lambda landmarks: predictor.from_landmarks(landmarks).ypr_deg,
-    }
-
-
-def compare(rows: Rows, every: dict[str, Estimator]) -> list[Evaluation]:
-    """Every estimator on the same rows."""
-    return [evaluate(name, estimate(rows.landmarks), rows.rotation) for name, estimate in every.items()]
-
-
-def summary(e: Evaluation) -> dict[str, Any]:
-    """The overall numbers of one estimator."""
-    mae = dict(zip(ANGLES, e.mae, strict=True))
-    return {
-        "estimator": e.name,
-        "rows": e.count,
-        **mae,
-        "mae": e.mean_mae,
-        "maev": e.maev,
-        "geodesic": e.geodesic,
-    }
 
 
 def _subjects(datasets: Sequence[Path], settings: FitSettings) -> tuple[set[str], set[str]]:

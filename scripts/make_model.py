@@ -162,7 +162,7 @@ def main() -> None:
     grid = build(GRID, work, given.scale)
     training = [build(one, work, given.scale) for one in TRAINING]
     model = work / "model"
-    fit = [*_python("downstream_hpe"), "fit", str(grid), "--out", str(model), "--holes", "mask", "--json"]
+    fit = [*_python("downstream_hpe"), "fit", str(grid), "--out", str(model), "--missing", "keep", "--json"]
     fit += ["--threads", "1"]
     fit += [word for path in training for word in ("--extra", str(path))]
     card = json.loads(run(fit + (["--epochs", str(given.epochs)] if given.epochs else [])))

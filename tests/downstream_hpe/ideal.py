@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from downstream_hpe.normalise import FEATURES, POINTS
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.tensor import ArrayTensor
+from downstream_hpe.geometry.face_mesh import FEATURES, POINTS
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.manifold.slabs import ArrayTensor
 
 AXES = (np.arange(-50.0, 51, 25), np.arange(-40.0, 41, 20), np.arange(-30.0, 31, 15))
 

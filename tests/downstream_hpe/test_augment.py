@@ -7,8 +7,9 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe.augment import NONE, disturbed, levelled, mirror_pairs, shapes_of
-from downstream_hpe.rotation import angles_from_rotation, rotation_from_angles
+from downstream_hpe.geometry.face_mesh import mirror_pairs
+from downstream_hpe.geometry.rotation import angles_from_rotation, rotation_from_angles
+from downstream_hpe.networks.augment import NONE, disturbed, levelled, shapes_of
 
 COUNT = 40
 

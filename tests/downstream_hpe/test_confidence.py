@@ -5,11 +5,12 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe.confidence import calibrate, level_faces, reliability
 from downstream_hpe.errors import ModelError
-from downstream_hpe.metrics import geodesic_errors
-from downstream_hpe.normalise import normalise
-from downstream_hpe.rotation import rotation_from_angles
+from downstream_hpe.evaluation.reliability import reliability
+from downstream_hpe.geometry.metrics import geodesic_errors
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.networks.confidence import calibrate, level_faces
 
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
 COUNT = 800

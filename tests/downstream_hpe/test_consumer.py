@@ -22,11 +22,14 @@ import sys
 for name in ("generator", "bpy", "mediapipe", "cv2", "torch", "onnx"):
     sys.modules[name] = None
 import numpy as np
-from downstream_hpe import cli, detector, inputs, measuring, predicting, records, reference, tensor, video
+from downstream_hpe.cli import app
+from downstream_hpe.evaluation import reference, scored_rows
+from downstream_hpe.prediction import detector, inputs, predictions, records, video
+from downstream_hpe.tables import tensor
 from downstream_hpe.errors import ModelError
-from downstream_hpe.predictor import Predictor
+from downstream_hpe.prediction.predictor import Predictor
 predictor = Predictor.load("m.onnx")
-rows = measuring.dataset_rows(predictor, "d", None, print).rows
+rows = scored_rows.dataset_rows(predictor, "d", None, print).rows
 print(len(rows), predictor.from_landmarks(rows.landmarks).ypr_deg.shape)
 for need in (lambda: predictor.from_image(np.zeros((9, 9, 3), dtype=np.uint8)), lambda: video.VideoReader(0)):
     try:

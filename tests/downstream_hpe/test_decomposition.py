@@ -7,11 +7,11 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe import tucker
-from downstream_hpe.decomposition import decompose
 from downstream_hpe.errors import DataError
-from downstream_hpe.rowspace import RowSpace
-from downstream_hpe.tensor import ArrayTensor
+from downstream_hpe.manifold import tucker
+from downstream_hpe.manifold.decomposition import decompose
+from downstream_hpe.manifold.rowspace import RowSpace
+from downstream_hpe.manifold.slabs import ArrayTensor
 
 
 @pytest.fixture(scope="module")

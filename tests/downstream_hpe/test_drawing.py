@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from downstream_hpe.errors import DataError, UsageError
-from downstream_hpe.face import Face
-from downstream_hpe.pictures import draw_faces
-from downstream_hpe.records import COLUMNS, RecordWriter, record, text
-from downstream_hpe.rotation import rotation_from_angles
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.prediction.drawing import draw_faces
+from downstream_hpe.prediction.face import Face
+from downstream_hpe.prediction.records import COLUMNS, RecordWriter, record, text
 
 
 def face(size=100.0, confidence=0.9, in_range=True, ypr=(30.0, 10, 5), index=0):

@@ -8,20 +8,14 @@ import numpy as np
 import pytest
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.evaluation import (
-    constant_zero,
-    evaluate,
-    markdown,
-    rigid_fit,
-    split_subjects,
-    within_bounds,
-    write_csv,
-)
-from downstream_hpe.normalise import normalise
-from downstream_hpe.plots import interval_figure, write_plots
-from downstream_hpe.reference import load_reference, mean_face
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.tables import Rows
+from downstream_hpe.evaluation.estimators import constant_zero, rigid_fit
+from downstream_hpe.evaluation.plots import interval_figure, write_plots
+from downstream_hpe.evaluation.reference import load_reference, mean_face
+from downstream_hpe.evaluation.scores import evaluate, markdown, within_bounds, write_csv
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.tables.rows import Rows
+from downstream_hpe.tables.splits import split_subjects
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,9 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe import cli
+from downstream_hpe import cli, fitting
+
+pytestmark = pytest.mark.slow
 
 pytest.importorskip("torch")
 pytest.importorskip("onnxruntime")
@@ -61,8 +63,8 @@ def model(dataset, extra, tmp_path_factory):
     folder = tmp_path_factory.mktemp("model") / "model"
     with pytest.MonkeyPatch.context() as patch:
         # Of ideal faces the frontal one, rotated, is what was missed; the masked fit takes many passes.
-        code = run("fit", dataset, "--out", folder, "--holes", "rotate", "--epochs", "15", "--threads", "1",
-                   "--extra", extra, monkeypatch=patch)  # fmt: skip
+        code = run("fit", dataset, "--out", folder, "--missing", "frontal", "--epochs", "15",
+                   "--threads", "1", "--extra", extra, monkeypatch=patch)  # fmt: skip
     assert code == 0
     return folder
 
@@ -108,7 +110,7 @@ def test_evaluate_leaves_out_what_was_trained_on(model, dataset, tmp_path, monke
 
 
 def test_evaluate_says_that_a_dataset_counts_from_another_zero(model, dataset, tmp_path, monkeypatch, capsys):
-    from downstream_hpe.predictor import Predictor
+    from downstream_hpe.prediction.predictor import Predictor
 
     assert Predictor.load(model).pose_zero == "canonical"
     assert run("evaluate", model, dataset, monkeypatch=monkeypatch) == 0
@@ -125,7 +127,7 @@ def test_datasets_that_count_from_two_zeros_are_not_learned_from(
     other = tmp_path / "other"
     other.mkdir()
     (other / "data").symlink_to(extra / "data")
-    arguments = ("fit", dataset, "--out", tmp_path / "m", "--holes", "rotate", "--extra", other)
+    arguments = ("fit", dataset, "--out", tmp_path / "m", "--missing", "frontal", "--extra", other)
     for zero, says in (("source", "built with --frame source, but"), (None, "not a readable manifest")):
         counted_from(zero, other)
         if zero is None:
@@ -138,7 +140,7 @@ def test_datasets_that_count_from_two_zeros_are_not_learned_from(
 
 
 def test_export_writes_what_predictor_reads(model, dataset, tmp_path, monkeypatch, capsys):
-    from downstream_hpe.predictor import Predictor
+    from downstream_hpe.prediction.predictor import Predictor
 
     onnx, weights = tmp_path / "p.onnx", tmp_path / "p.safetensors"
     assert run("export", model, "--onnx", onnx, "--weights", weights, monkeypatch=monkeypatch) == 0
@@ -173,9 +175,41 @@ def test_mistakes_are_one_clear_line(arguments, code, says, tmp_path, monkeypatc
     assert error.count("\n") == 1
 
 
-def test_holes_are_refused_until_told(dataset, tmp_path, monkeypatch, capsys):
+def test_missing_cells_are_refused_until_told(dataset, tmp_path, monkeypatch, capsys):
     assert run("fit", dataset, "--out", tmp_path / "m", monkeypatch=monkeypatch) == 1
-    assert "choose a treatment: mask, exact or rotate" in capsys.readouterr().err
+    assert "choose --missing keep, exact or frontal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ([], "fail"),
+        (["--missing", "keep"], "keep"),
+        (["--holes", "refuse"], "fail"),
+        (["--holes", "mask"], "keep"),
+        (["--holes", "exact"], "exact"),
+        (["--holes", "rotate"], "frontal"),
+    ],
+)
+def test_holes_is_what_missing_was_called(arguments, expected, tmp_path, monkeypatch):
+    """Yesterday's command lines run, with today's words in the model's card."""
+    asked = []
+
+    def fit(dataset, folder, settings, note, progress):
+        asked.append(settings.missing)
+        return fitting.Fitted({})
+
+    monkeypatch.setattr(fitting, "fit", fit)
+    assert run("fit", "d", "--out", tmp_path / "m", *arguments, monkeypatch=monkeypatch) == 0
+    assert asked == [expected]
+
+
+def test_the_old_name_is_hidden_and_not_mixed_with_the_new_one(tmp_path, monkeypatch, capsys):
+    assert run("fit", "--help", monkeypatch=monkeypatch) == 0
+    assert "--holes" not in capsys.readouterr().out
+    both = ("fit", "d", "--out", tmp_path / "m", "--missing", "keep", "--holes", "exact")
+    assert run(*both, monkeypatch=monkeypatch) == 2
+    assert "--holes is the old name of --missing" in capsys.readouterr().err
 
 
 def test_the_papers_recipe_takes_no_other_poses(dataset, extra, tmp_path, monkeypatch, capsys):
@@ -186,7 +220,7 @@ def test_the_papers_recipe_takes_no_other_poses(dataset, extra, tmp_path, monkey
 
 def test_one_identity_is_refused(dataset, tmp_path, monkeypatch, capsys):
     part = dataset / "data" / "part-0.parquet"
-    assert run("fit", part, "--out", tmp_path / "m", "--holes", "mask", monkeypatch=monkeypatch) == 1
+    assert run("fit", part, "--out", tmp_path / "m", "--missing", "keep", monkeypatch=monkeypatch) == 1
     error = capsys.readouterr().err
     assert "subjects" in error or "heads" in error
     assert error.count("\n") == 1

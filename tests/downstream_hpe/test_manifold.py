@@ -5,16 +5,10 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe.decomposition import decompose
 from downstream_hpe.errors import DataError
-from downstream_hpe.manifold import (
-    cosine_slopes,
-    cosines,
-    fit_cosines,
-    fit_manifolds,
-    fourier_start,
-    plot_manifolds,
-)
+from downstream_hpe.manifold.cosines import cosine_slopes, cosines, fit_cosines, fit_manifolds, fourier_start
+from downstream_hpe.manifold.decomposition import decompose
+from downstream_hpe.manifold.plot import plot_manifolds
 
 
 @pytest.mark.parametrize("samples", [7, 9, 11])

@@ -7,8 +7,8 @@ from PIL import Image
 from scipy.io import savemat
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.photographs import FORMATS, LeftOut, aflw2000, biwi, biwi_npz, detected_rows
-from downstream_hpe.rotation import angles_from_rotation, rotation_from_angles
+from downstream_hpe.evaluation.photographs import FORMATS, LeftOut, aflw2000, biwi, biwi_npz, detected_rows
+from downstream_hpe.geometry.rotation import angles_from_rotation, rotation_from_angles
 
 YPR = np.array([-35, 12.5, -7])
 FACE = np.random.default_rng(0).uniform(-10, 10, size=(468, 3))

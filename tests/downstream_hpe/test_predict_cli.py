@@ -15,11 +15,14 @@ from PIL import Image
 from scipy.io import savemat
 from tiny_onnx import tiny_model
 
-from downstream_hpe import cli, predictor
-from downstream_hpe.detector import FaceDetector
+from downstream_hpe import cli
 from downstream_hpe.errors import DataError
-from downstream_hpe.metrics import geodesic_errors
-from downstream_hpe.rotation import fit_rotation
+from downstream_hpe.geometry.metrics import geodesic_errors
+from downstream_hpe.geometry.rotation import fit_rotation
+from downstream_hpe.prediction import predictor
+from downstream_hpe.prediction.detector import FaceDetector
+
+pytestmark = pytest.mark.slow
 
 pytest.importorskip("onnxruntime")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from tiny_onnx import FACTS, onnx, tiny_model
 
-from downstream_hpe import graph, predictor
 from downstream_hpe.errors import DataError, ModelError
-from downstream_hpe.predictor import Predictor, model_folder
+from downstream_hpe.prediction import onnx_file, predictor
+from downstream_hpe.prediction.predictor import Predictor, model_folder
 
 pytest.importorskip("onnxruntime")
 
@@ -168,16 +168,16 @@ def test_metadata_of_something_else(tmp_path, facts, message):
 
 def test_a_model_cut_anywhere_or_changed_is_refused_or_read_but_never_more(tmp_path):
     whole = tiny_model().SerializeToString()
-    assert graph.fault(whole) is None
+    assert onnx_file.fault(whole) is None
     rng = np.random.default_rng(0)
     for at in (*range(60), *rng.integers(60, len(whole), 20)):
-        if graph.fault(whole[:at]) is None:
+        if onnx_file.fault(whole[:at]) is None:
             with pytest.raises(ModelError):
                 load(whole[:at], tmp_path)
     for _ in range(200):
         changed = bytearray(whole)
         changed[rng.integers(len(whole))] = rng.integers(256)
-        graph.fault(bytes(changed))
+        onnx_file.fault(bytes(changed))
 
 
 def test_a_tag_too_long_for_other_readers_is_no_hiding_place():
@@ -185,11 +185,11 @@ def test_a_tag_too_long_for_other_readers_is_no_hiding_place():
     tag = (1 << 32) | (13 << 3) | 2
     hidden = bytes([*((tag >> shift) & 0x7F | 0x80 for shift in (0, 7, 14, 21)), tag >> 28, 0])
     inside = b"\x2a" + bytes([len(hidden)]) + hidden
-    assert graph.fault(b"\x3a" + bytes([len(inside)]) + inside) == "it is no ONNX file or cut off"
+    assert onnx_file.fault(b"\x3a" + bytes([len(inside)]) + inside) == "it is no ONNX file or cut off"
 
 
 def test_a_file_too_large_is_not_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(graph, "MAX_BYTES", 100)
+    monkeypatch.setattr(onnx_file, "MAX_BYTES", 100)
     with pytest.raises(ModelError, match="larger than"):
         load(tiny_model(), tmp_path)
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from downstream_hpe.decomposition import decompose
-from downstream_hpe.manifold import fit_manifolds
-from downstream_hpe.normalise import normalise
-from downstream_hpe.reconstruction import ReconstructionEstimator
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.manifold.cosines import fit_manifolds
+from downstream_hpe.manifold.decomposition import decompose
+from downstream_hpe.manifold.reconstruction import ReconstructionEstimator
 
 BOUNDS = np.array([50, 40, 30])
 

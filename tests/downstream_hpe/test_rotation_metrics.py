@@ -4,8 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from downstream_hpe.metrics import axis_errors, euler_errors, geodesic_errors
-from downstream_hpe.rotation import angles_from_rotation, fit_rotation, rotation_from_angles
+from downstream_hpe.geometry.metrics import axis_errors, euler_errors, geodesic_errors
+from downstream_hpe.geometry.rotation import angles_from_rotation, fit_rotation, rotation_from_angles
 
 # docs/conventions.md, test vectors.
 VECTORS = [

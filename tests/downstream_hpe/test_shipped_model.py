@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 from generator.plan.render_settings import RenderSettings
 
-from downstream_hpe.metrics import euler_errors
-from downstream_hpe.pictures import read_bgr
-from downstream_hpe.predictor import MODELS, Predictor
-from downstream_hpe.rotation import angles_from_rotation
+from downstream_hpe.geometry.metrics import euler_errors
+from downstream_hpe.geometry.rotation import angles_from_rotation
+from downstream_hpe.prediction.pictures import read_bgr
+from downstream_hpe.prediction.predictor import MODELS, Predictor
 from generator.geometry.camera import framing_distance
 from generator.geometry.rotation import rotation_from_angles
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
 from generator.placing.anchoring import anchor_head, level_head
+
+pytestmark = pytest.mark.slow
 
 pytest.importorskip("onnxruntime")
 

@@ -9,13 +9,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from downstream_hpe.errors import DataError
-from downstream_hpe.normalise import normalise
-from downstream_hpe.tables import ROTATION, SCHEMA_MAJOR, TOPOLOGY, open_tables, read_rows
-from downstream_hpe.tensor import open_tensor
+from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.geometry.face_mesh import TOPOLOGY
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.tables.columns import ROTATION
+from downstream_hpe.tables.missing import EXACT_COLUMNS, exact_in_pixels
+from downstream_hpe.tables.open import SCHEMA_MAJOR, open_tables
+from downstream_hpe.tables.rows import read_rows
+from downstream_hpe.tables.tensor import open_tensor
 
 HEADS = ("amy", "bob", "cid")
-HOLE = 7
+GONE = 7
 
 
 @pytest.fixture
@@ -65,8 +69,8 @@ def test_normalisations():
         normalise(np.ones((468, 3)))
 
 
-def test_holes_are_refused_and_named(tmp_path, heads):
-    ideal.drop(heads["bob"], HOLE)
+def test_missing_cells_are_refused_and_named(tmp_path, heads):
+    ideal.drop(heads["bob"], GONE)
     heads["cid"] = {name: np.delete(values, 3, axis=0) for name, values in heads["cid"].items()}
     with pytest.raises(
         DataError, match=r"2 cells without landmarks \(1 of them without a row\): bob/neutral at yaw"
@@ -74,52 +78,97 @@ def test_holes_are_refused_and_named(tmp_path, heads):
         open_tensor(write_heads(tmp_path, heads))
 
 
-def test_masked_holes_are_nan_and_nothing_else_is(tmp_path, heads):
-    ideal.drop(heads["bob"], HOLE)
-    tensor = open_tensor(write_heads(tmp_path, heads), holes="mask")
+def test_kept_cells_are_nan_and_nothing_else_is(tmp_path, heads):
+    ideal.drop(heads["bob"], GONE)
+    tensor = open_tensor(write_heads(tmp_path, heads), missing="keep")
     values = tensor.to_array().reshape(3, -1, 1404)
-    assert np.isnan(values[1, HOLE]).all()
+    assert np.isnan(values[1, GONE]).all()
     assert np.isnan(values).sum() == 1404
     assert tensor.report.text().startswith("1 cells without landmarks left out of the fit")
     np.testing.assert_array_equal(tensor.observed, ~np.isnan(values[..., 0]).reshape(3, 5, 5, 5))
 
 
-def test_rotated_frontal_fills_rigid_heads_exactly(tmp_path, heads):
+def test_turned_frontal_fills_rigid_heads_exactly(tmp_path, heads):
     true = open_tensor(write_heads(tmp_path / "whole", heads)).to_array()
-    ideal.drop(heads["bob"], HOLE)
-    tensor = open_tensor(write_heads(tmp_path / "holes", heads), holes="rotate")
+    ideal.drop(heads["bob"], GONE)
+    # Of cid the front itself is missing; the detection nearest to it is turned instead.
+    ideal.drop(heads["cid"], 62)
+    tensor = open_tensor(write_heads(tmp_path / "gaps", heads), missing="frontal")
     np.testing.assert_allclose(tensor.to_array(), true, atol=1e-5)
-    assert len(tensor.report.cells) == 1
+    assert len(tensor.report.cells) == 2
 
 
-def test_rotate_needs_the_frontal_cell(tmp_path, heads):
-    axes = (np.array([-30.0, -10, 10, 30]), *ideal.AXES[1:])
+def test_the_front_need_not_be_a_cell_of_the_grid(tmp_path):
+    axes = (np.array([-30.0, -10, 12, 30]), *ideal.AXES[1:])
     faces = ideal.Faces().draw(2, np.random.default_rng(1))
     uneven = {name: ideal.rows(face, name, axes) for name, face in zip("ab", faces, strict=True)}
-    with pytest.raises(DataError, match="no cell at 0, 0, 0"):
-        open_tensor(write_heads(tmp_path, uneven), holes="rotate")
+    true = open_tensor(write_heads(tmp_path / "whole", uneven)).to_array()
+    ideal.drop(uneven["a"], GONE)
+    tensor = open_tensor(write_heads(tmp_path / "gaps", uneven), missing="frontal")
+    np.testing.assert_allclose(tensor.to_array(), true, atol=1e-5)
+
+
+def test_a_head_that_was_never_detected_can_be_filled_by_none_of_its_own(tmp_path, heads):
+    for row in range(125):
+        ideal.drop(heads["bob"], row)
+    write_heads(tmp_path, heads)
+    for missing in ("keep", "frontal"):
+        with pytest.raises(DataError, match="bob/neutral was never detected"):
+            open_tensor(tmp_path, missing=missing)
+    with pytest.raises(UsageError, match="'skip' is none of fail, keep, exact, frontal"):
+        open_tensor(tmp_path, missing="skip")
+
+
+def camera_columns(count, projection, away):
+    """K, pivot and projection of rows, as the generator writes them."""
+    return {
+        "camera": np.tile([800.0, 0, 128, 0, 800, 128, 0, 0, 1], (count, 1)),
+        "translation_mm": np.tile([0.0, 0, away], (count, 1)),
+        "projection": np.array([projection] * count),
+    }
+
+
+def test_missing_cells_are_filled_as_the_generator_fills_them(tmp_path, heads):
+    theirs = pytest.importorskip("generator.dataset.format.missing")
+    rng = np.random.default_rng(3)
+    for columns in heads.values():
+        points = columns["landmarks"].astype(float).reshape(-1, 468, 3) - 128
+        exact = points + rng.normal(scale=2, size=points.shape) + [5, -9, 600]
+        columns["landmarks_exact"] = exact.reshape(-1, 1404).astype(np.float32)
+        columns |= camera_columns(len(points), "perspective", 640.0)
+        columns["projection"] = np.where(np.arange(len(points)) % 2, "orthographic", "perspective")
+    heads["amy"]["landmarks_exact"][5, :3] = np.nan  # a point without an anchor
+    for row in (0, 62, 101):
+        ideal.drop(heads["bob"], row)
+    write_heads(tmp_path, heads)
+    batches = list(open_tables(tmp_path, EXACT_COLUMNS).batches([*EXACT_COLUMNS, "subject"]))
+    every = pq.read_table(tmp_path)
+    ours = np.concatenate([exact_in_pixels(batch) for batch in batches])
+    np.testing.assert_array_equal(ours, theirs.exact_in_pixels(every))
+    gone = ~every["detected"].to_numpy()
+    for missing, filled in (("exact", ours), ("frontal", theirs.rotated_frontal(every))):
+        values = open_tensor(tmp_path, missing=missing).to_array().reshape(-1, 1404)
+        expected = normalise(filled[gone].astype(float)).reshape(-1, 1404)
+        np.testing.assert_allclose(values[gone], expected, atol=2e-6)
 
 
 @pytest.mark.parametrize(("projection", "away"), [("orthographic", 700.0), ("perspective", 1e6)])
 def test_exact_landmarks_fill_what_the_detector_missed(tmp_path, heads, projection, away):
-    camera = np.array([800.0, 0, 128, 0, 800, 128, 0, 0, 1])
     for columns in heads.values():
         # Seen from afar perspective, too, is the parallel projection the pixels were made with.
         points = columns["landmarks"].astype(float).reshape(-1, 468, 3) - 128
         columns["landmarks_exact"] = (points + np.array([0, 0, away])).reshape(-1, 1404)
-        columns["camera"] = np.tile(camera, (len(points), 1))
-        columns["translation_mm"] = np.tile([0.0, 0, away], (len(points), 1))
-        columns["projection"] = np.array([projection] * len(points))
+        columns |= camera_columns(len(points), projection, away)
     true = open_tensor(write_heads(tmp_path / "whole", heads)).to_array()
-    ideal.drop(heads["bob"], HOLE)
-    tensor = open_tensor(write_heads(tmp_path / "holes", heads), holes="exact")
+    ideal.drop(heads["bob"], GONE)
+    tensor = open_tensor(write_heads(tmp_path / "gaps", heads), missing="exact")
     np.testing.assert_allclose(tensor.to_array(), true, atol=1e-3 if projection == "perspective" else 1e-5)
     assert "filled from exact landmarks" in tensor.report.text()
 
 
 def test_exact_without_its_column_says_so(dataset):
-    with pytest.raises(DataError, match="no column landmarks_exact; choose mask or rotate"):
-        open_tensor(dataset, holes="exact")
+    with pytest.raises(DataError, match="no column landmarks_exact; choose --missing keep or frontal"):
+        open_tensor(dataset, missing="exact")
 
 
 def _without_landmarks(columns):
@@ -127,7 +176,7 @@ def _without_landmarks(columns):
 
 
 def _nan_though_detected(columns):
-    columns["landmarks"][HOLE, 5] = np.nan
+    columns["landmarks"][GONE, 5] = np.nan
 
 
 def _other_rotation(columns):
@@ -160,7 +209,7 @@ def _two_grids(columns):
 def test_bad_rows_end_in_one_line(tmp_path, heads, spoil, message):
     spoil(heads["bob"])
     with pytest.raises(DataError, match=message) as caught:
-        open_tensor(write_heads(tmp_path, heads), holes="mask").to_array()
+        open_tensor(write_heads(tmp_path, heads), missing="keep").to_array()
     assert "\n" not in str(caught.value)
 
 
@@ -203,7 +252,7 @@ def test_one_identity_nothing_there_and_no_parquet(tmp_path, heads):
 
 
 def test_rows_leave_out_the_undetected_and_keep_the_split(tmp_path, heads):
-    ideal.drop(heads["bob"], HOLE)
+    ideal.drop(heads["bob"], GONE)
     heads["cid"]["split"][:] = "validation"
     write_heads(tmp_path, heads)
     train = read_rows(tmp_path, "train")

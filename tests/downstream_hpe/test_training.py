@@ -8,22 +8,26 @@ import ideal
 import numpy as np
 import pytest
 
-from downstream_hpe.confidence import calibrate, level_faces
-from downstream_hpe.decomposition import decompose
 from downstream_hpe.errors import DataError, ModelError
-from downstream_hpe.model import TensorModel
-from downstream_hpe.normalise import normalise
-from downstream_hpe.reference import mean_face
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.tables import Rows
+from downstream_hpe.evaluation.reference import mean_face
+from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.manifold.decomposition import decompose
+from downstream_hpe.manifold.tensor_model import TensorModel
+from downstream_hpe.networks.confidence import calibrate, level_faces
+from downstream_hpe.tables.rows import Rows
+
+pytestmark = pytest.mark.slow
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnxruntime")
 
-from downstream_hpe.export import export_int8, export_onnx  # noqa: E402
-from downstream_hpe.networks import PoseNetwork, Weights, rotation_of  # noqa: E402
-from downstream_hpe.predictor import Predictor  # noqa: E402
-from downstream_hpe.training import PAPER, Recipe, train  # noqa: E402
+from downstream_hpe.networks.export import export_int8, export_onnx  # noqa: E402
+from downstream_hpe.networks.pose_network import PoseNetwork, rotation_of  # noqa: E402
+from downstream_hpe.networks.recipe import PAPER, Recipe  # noqa: E402
+from downstream_hpe.networks.training import train  # noqa: E402
+from downstream_hpe.networks.weights import Weights  # noqa: E402
+from downstream_hpe.prediction.predictor import Predictor  # noqa: E402
 
 SMALL = Recipe(layers=(1404, 32, 9), head_layers=(3, 16, 1), epochs=2, batch=64)
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])

@@ -10,13 +10,13 @@ import pytest
 from PIL import Image
 
 from downstream_hpe.errors import DataError, UsageError
-from downstream_hpe.face import FaceTracks
-from downstream_hpe.inputs import Source, find_sources
-from downstream_hpe.metrics import geodesic_errors
-from downstream_hpe.predicting import Options, predictions
-from downstream_hpe.predictor import Pose
-from downstream_hpe.rotation import rotation_from_angles
-from downstream_hpe.smoothing import OneEuroFilter
+from downstream_hpe.geometry.metrics import geodesic_errors
+from downstream_hpe.geometry.rotation import rotation_from_angles
+from downstream_hpe.prediction.inputs import Source, find_sources
+from downstream_hpe.prediction.predictions import Options, predictions
+from downstream_hpe.prediction.predictor import Pose
+from downstream_hpe.prediction.smoothing import OneEuroFilter
+from downstream_hpe.prediction.tracks import FaceTracks
 
 SHAPE = np.random.default_rng(0).uniform(-8, 8, size=(468, 3))
 
@@ -67,7 +67,7 @@ def frame(*xs):
 
 def write(path, frames):
     pytest.importorskip("cv2")
-    from downstream_hpe.video import VideoWriter
+    from downstream_hpe.prediction.video import VideoWriter
 
     with VideoWriter(path, 25.0) as writer:
         for image in frames:

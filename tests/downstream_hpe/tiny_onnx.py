@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from downstream_hpe.predictor import FORMAT
+from downstream_hpe.prediction.onnx_file import FORMAT
 
 onnx = pytest.importorskip("onnx")
 

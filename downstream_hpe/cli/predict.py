@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""What ``downstream-hpe predict`` does with its options."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from downstream_hpe.cli.console import JsonFlag, note
+from downstream_hpe.errors import DataError
+
+
+def predict(
+    inputs: Annotated[list[str], typer.Argument(help="Pictures, videos, folders of them, webcam:0.")],
+    model: Annotated[
+        str, typer.Option(help="The name of a model, a model folder, or an .onnx file.")
+    ] = "headturn",
+    table: Annotated[Path | None, typer.Option("--out", help="Write a .csv or .parquet file.")] = None,
+    drawn: Annotated[
+        Path | None,
+        typer.Option("--draw", help="Folder for copies with axes and angles; of one input a file, too."),
+    ] = None,
+    faces: Annotated[int, typer.Option(min=1, help="At most so many faces a picture or frame.")] = 1,
+    smooth: Annotated[bool, typer.Option(help="One-euro filter on video.")] = False,
+    frames: Annotated[int | None, typer.Option(min=1, help="Stop a video after so many frames.")] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Head pose of the faces in pictures, videos and webcams; Ctrl-C ends a webcam."""
+    from downstream_hpe.prediction.inputs import find_sources
+    from downstream_hpe.prediction.predictions import Options, predictions
+    from downstream_hpe.prediction.predictor import Predictor
+    from downstream_hpe.prediction.records import RecordWriter, text
+
+    left_out: list[str] = []
+
+    def leave_out(line: str) -> None:
+        left_out.append(line)
+        if alone and not images:
+            raise DataError(line)
+        note(line)
+
+    alone, images, with_face = False, 0, 0
+    every = find_sources(inputs, drawn, leave_out)
+    alone = len(every) == 1
+    predictor = Predictor.load(model)
+    options = Options(faces, smooth, frames)
+    last, stopped = None, False
+    began = ended = 0.0
+    with contextlib.ExitStack() as stack:
+        stack.callback(predictor.close)
+        writer = None if table is None else stack.enter_context(RecordWriter(table))
+        rows = stack.enter_context(contextlib.closing(predictions(every, predictor, options, leave_out)))
+        try:
+            for row in rows:
+                if (row["input"], row["frame"]) != last:
+                    images += 1
+                    with_face += row["found"]
+                    ended = time.monotonic()
+                    began = began or ended
+                    last = (row["input"], row["frame"])
+                if writer is not None:
+                    writer.add(row)
+                typer.echo(json.dumps(row) if as_json else text(row, faces > 1))
+        except KeyboardInterrupt:
+            stopped = True
+    # From the first to the last, without the start of the detector.
+    rate = f", {(images - 1) / (ended - began):.1f} a second" if images > 1 else ""
+    if images:
+        note(f"a face in {with_face} of {images} pictures and frames{rate}")
+        if drawn is not None:
+            note(f"drawn: {drawn if len(every) > 1 else every[0].copy}")
+    if stopped and not any(isinstance(source.path, int) for source in every):
+        raise typer.Exit(130)
+    if not images:
+        raise DataError(f"nothing could be read of {len(every)} inputs")
+    if not with_face:
+        raise DataError("no face found")
+    if left_out:
+        raise typer.Exit(3)

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Which rows `downstream-hpe evaluate` scores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.evaluation.photographs import FORMATS, LeftOut, detected_rows
+from downstream_hpe.evaluation.scores import BOUNDS_DEG, within_bounds
+from downstream_hpe.prediction.inputs import MEDIA
+from downstream_hpe.prediction.predictor import Predictor
+from downstream_hpe.tables.pose_zero import MANIFEST, pose_zero
+from downstream_hpe.tables.rows import Rows, read_missed, read_rows
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """rows: with a face. missed_deg: float64 [M, 3], (yaw, pitch, roll) of those without one. damaged: how
+    many more could not be read."""
+
+    rows: Rows
+    missed_deg: np.ndarray
+    damaged: int = 0
+
+
+def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, note: Note) -> Measured:
+    """The rows of a dataset whose subjects the model was not trained on.
+
+    Raises
+    ------
+    UsageError: pictures instead of tables. DataError: no such rows.
+    """
+    _expect_tables(Path(dataset))
+    rows = read_rows(dataset, split)
+    subjects, missed_deg = read_missed(dataset, split)
+    theirs = pose_zero(dataset)
+    if theirs and predictor.pose_zero and theirs != predictor.pose_zero:
+        note(
+            f"{dataset} counts angles with --frame {theirs}, the model with {predictor.pose_zero}: "
+            "a constant difference a head is to be expected, mostly in pitch"
+        )
+    trained = sorted(predictor.trained_subjects)
+    unseen = ~np.isin(rows.subjects, trained)
+    if not unseen.any():
+        raise DataError(f"{dataset}: the model was trained on every subject in it; give other heads")
+    if not unseen.all():
+        note(f"{len(np.unique(rows.subjects[~unseen]))} subjects the model was trained on left out")
+    return Measured(rows.take(unseen), missed_deg[~np.isin(subjects, trained)])
+
+
+def photograph_rows(predictor: Predictor, path: Path, layout: str, note: Note) -> Measured:
+    """The labelled photographs of a folder or file in which the labelled face is found.
+
+    layout: a key of :data:`downstream_hpe.evaluation.photographs.FORMATS`.
+
+    Raises
+    ------
+    DataError: as the format's loader; no face found.
+    """
+    left_out = LeftOut()
+    try:
+        rows, missed_deg = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
+    finally:
+        # Also where nothing is left, for they say why.
+        for line in left_out.damaged:
+            note(f"{line}; left out")
+        for reason, count in left_out.filtered.items():
+            note(f"{count} photographs left out: {reason}")
+    return Measured(rows, missed_deg, len(left_out.damaged))
+
+
+def bounded(measured: Measured, path: Path, note: Note) -> Measured:
+    """Only the rows in the paper's bounds. DataError: none there."""
+    inside = within_bounds(measured.rows.ypr_deg)
+    bounds = ", ".join(f"{bound:g}" for bound in BOUNDS_DEG)
+    if not inside.any():
+        raise DataError(f"{path}: no pose within {bounds} degrees; use --all")
+    if not inside.all():
+        note(f"{int((~inside).sum())} rows outside {bounds} degrees left out")
+    missed_deg = measured.missed_deg[within_bounds(measured.missed_deg)]
+    return replace(measured, rows=measured.rows.take(inside), missed_deg=missed_deg)
+
+
+def _expect_tables(path: Path) -> None:
+    """UsageError where there are pictures and no tables. What else is wrong the reader of tables says."""
+    if (path / MANIFEST).is_file():
+        return  # beside its tables a dataset may hold millions of pictures, not to be listed
+    below = path.rglob("*") if path.is_dir() else [path]
+    suffixes = {file.suffix.lower() for file in below}
+    if suffixes & (MEDIA | {".mat", ".npz"}) and ".parquet" not in suffixes:
+        raise UsageError(
+            f"{path}: no dataset; evaluate takes a folder or .parquet of headturn build or, with --format "
+            "aflw2000, biwi or biwi-npz, labelled photographs; for others there is downstream-hpe predict"
+        )

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Faces in a picture: MediaPipe Face Mesh, and for faces too small for it a closer look."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from downstream_hpe.errors import INSTALL, DataError, ModelError
+from downstream_hpe.geometry.face_mesh import POINTS
+
+CONFIDENCE = 0.5
+CLOSER = 2.5
+"""Side of the square for a closer look, in sizes of the face."""
+LARGE_ENOUGH = 0.3
+"""Faces of this share of the picture's longer side gain nothing from it: benchmarks/small_faces.py."""
+
+
+class FaceDetector:
+    """Opens MediaPipe's models when they are first needed. ModelError: mediapipe is not installed."""
+
+    def __init__(self) -> None:
+        self._models: dict[str, Any] = {}
+        self._quiet: set[str] = set()
+
+    def faces(self, bgr: np.ndarray, limit: int = 1) -> np.ndarray:
+        """Landmarks of the most prominent faces: float64 [F, 468, 3], 0 <= F <= limit, isotropic pixels,
+        frame C.
+
+        Face Mesh finds faces from about a ninth of the picture's longer side on, and places them badly
+        where they are small: a face is looked at again in a square cut out around it. Where it finds
+        fewer than limit, MediaPipe's full-range face detector, which sees faces half that size, says
+        where to cut. bgr: uint8 [H, W, 3]; DataError: another array.
+        """
+        if bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.uint8 or not bgr.size:
+            raise DataError(f"expected a uint8 picture [H, W, 3], got {bgr.dtype} {bgr.shape}")
+        rgb = np.ascontiguousarray(bgr[..., ::-1])
+        found: list[np.ndarray] = []
+        for face in self.mesh(rgb, limit):
+            centre, size = _place(face)
+            small = size < LARGE_ENOUGH * max(rgb.shape)
+            closer = self._closer(rgb, centre, size) if small else None
+            found.append(face if closer is None else closer)
+        for centre, size in self._far_faces(rgb) if len(found) < limit else []:
+            if len(found) < limit and not any(_around(face, centre) for face in found):
+                closer = self._closer(rgb, centre, size)
+                found += [] if closer is None else [closer]
+        return np.array(found).reshape(-1, POINTS, 3)
+
+    def mesh(self, rgb: np.ndarray, limit: int = 1) -> list[np.ndarray]:
+        """Face Mesh alone: the faces of a contiguous RGB picture, each float64 [468, 3]."""
+
+        def create() -> Any:
+            from mediapipe.python.solutions.face_mesh import FaceMesh
+
+            # Each picture on its own, as those were that the models learn from.
+            return FaceMesh(
+                static_image_mode=True,
+                max_num_faces=limit,
+                refine_landmarks=False,
+                min_detection_confidence=CONFIDENCE,
+            )
+
+        height, width = rgb.shape[:2]
+        faces = self._run(f"mesh {limit}", create, rgb, "multi_face_landmarks")
+        points = [np.array([(p.x, p.y, p.z) for p in face.landmark[:POINTS]]) for face in faces]
+        return [face * [width, height, width] for face in points]
+
+    def close(self) -> None:
+        """Free the models."""
+        for model in self._models.values():
+            model.close()
+        self._models, self._quiet = {}, set()
+
+    def _run(self, name: str, create: Callable[[], Any], rgb: np.ndarray, result: str) -> Any:
+        # Until a model has found its first face, MediaPipe writes start-up notes to the terminal.
+        with contextlib.nullcontext() if name in self._quiet else _silence():
+            if name not in self._models:
+                try:
+                    self._models[name] = create()
+                except ImportError as error:
+                    raise ModelError(f"mediapipe 0.10.21 is not installed: {INSTALL}") from error
+            found = getattr(self._models[name].process(rgb), result) or []
+        if found:
+            self._quiet.add(name)
+        return found
+
+    def _closer(self, rgb: np.ndarray, centre: np.ndarray, size: float) -> np.ndarray | None:
+        """The face at centre, pixels, from a square around it; None where none is found there."""
+        left, top = np.maximum(centre - CLOSER / 2 * size, 0).astype(int).tolist()
+        right, bottom = np.maximum(centre + CLOSER / 2 * size, 0).astype(int).tolist()
+        square = np.ascontiguousarray(rgb[top:bottom, left:right])
+        if not square.size:
+            return None
+        seen = (face + np.array([left, top, 0]) for face in self.mesh(square, 1))
+        return next((face for face in seen if _around(face, centre)), None)
+
+    def _far_faces(self, rgb: np.ndarray) -> list[tuple[np.ndarray, float]]:
+        """Centre and size of the faces that the full-range detector sees, pixels, the surest first."""
+
+        def create() -> Any:
+            from mediapipe.python.solutions.face_detection import FaceDetection
+
+            return FaceDetection(model_selection=1, min_detection_confidence=CONFIDENCE)
+
+        height, width = rgb.shape[:2]
+        faces = sorted(self._run("far", create, rgb, "detections"), key=lambda face: -face.score[0])
+        found = []
+        for box in (face.location_data.relative_bounding_box for face in faces):
+            centre = np.array([(box.xmin + box.width / 2) * width, (box.ymin + box.height / 2) * height])
+            found.append((centre, max(box.width * width, box.height * height)))
+        return found
+
+
+def _place(face: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre [2] and longer side of the box of a face's landmarks."""
+    low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
+    return (low + high) / 2, float((high - low).max())
+
+
+def _around(face: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point lies in the box of a face's landmarks."""
+    low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
+    return bool(((point >= low) & (point <= high)).all())
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """What native code writes to stderr is lost."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

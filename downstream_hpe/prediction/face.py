@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""One face of a picture or frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LOW_CONFIDENCE = 0.5
+"""Below it a pose is drawn as uncertain."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """index: which face of the picture or video. landmarks float [468, 3], pixels. rotation float64 [3, 3],
+    R_C; ypr_deg float64 [3]. confidence: 0 to 1, None where the model gives none. in_range: whether the
+    angles are among those the model was trained on."""
+
+    index: int
+    landmarks: np.ndarray
+    rotation: np.ndarray
+    ypr_deg: np.ndarray
+    confidence: float | None
+    in_range: bool
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Around the landmarks: left, top, width, height, pixels."""
+        low, high = self.landmarks[:, :2].min(axis=0), self.landmarks[:, :2].max(axis=0)
+        return (*low.tolist(), *(high - low).tolist())
+
+    @property
+    def sure(self) -> bool:
+        """Whether the pose may be believed."""
+        return self.in_range and (self.confidence is None or self.confidence >= LOW_CONFIDENCE)

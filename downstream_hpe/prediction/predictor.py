@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""A trained model at work: landmarks or a picture in, head pose out. Needs onnxruntime only."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from downstream_hpe.errors import DataError, ModelError
+from downstream_hpe.geometry.face_mesh import POINTS
+from downstream_hpe.prediction import onnx_file
+from downstream_hpe.prediction.detector import FaceDetector
+from downstream_hpe.prediction.onnx_file import FORMAT, SHAPES
+
+MODEL_FILE = "model.onnx"
+DEFAULT_MODEL = "headturn"
+EXPORT_AGAIN = "export it again with downstream-hpe export"
+MODELS = Path(__file__).parents[1] / "models"
+"""The models that come with the package, by name."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """ypr_deg float32 [N, 3], (yaw, pitch, roll); rotation float32 [N, 3, 3], R_C; confidence
+    float32 [N], 0 to 1, or None where the model gives none."""
+
+    ypr_deg: np.ndarray
+    rotation: np.ndarray
+    confidence: np.ndarray | None = None
+
+
+class Predictor:
+    """Open one with :meth:`load`.
+
+    range_deg: float [3, 2], the angles the model was trained on; beyond them it extrapolates.
+    trained_subjects: whom it has seen, so that nobody measures it on them.
+    pose_zero: "source" or "canonical", as the data it learned from; None: not known.
+    """
+
+    def __init__(
+        self,
+        session: Any,
+        range_deg: np.ndarray,
+        trained_subjects: frozenset[str],
+        pose_zero: str | None,
+        name: str,
+    ) -> None:
+        self._session = session
+        self._name = name
+        self._outputs = [value.name for value in session.get_outputs() if value.name in SHAPES]
+        self._detector = FaceDetector()
+        self.range_deg = range_deg
+        self.trained_subjects = trained_subjects
+        self.pose_zero = pose_zero
+
+    @staticmethod
+    def load(model: Path | str = DEFAULT_MODEL, *, threads: int = 1) -> Predictor:
+        """model: the name of a model that comes with the package, a model folder of `downstream-hpe fit`,
+        or an exported .onnx file.
+
+        The file may come from anywhere: it is read as numbers and arithmetic only, see
+        :mod:`downstream_hpe.prediction.onnx_file`.
+
+        Raises
+        ------
+        ModelError: nothing there, not an ONNX file, or not one that `downstream-hpe export` wrote.
+        """
+        file = _file_of(model)
+        try:
+            if file.stat().st_size > onnx_file.MAX_BYTES:
+                raise ModelError(
+                    f"{file}: larger than {onnx_file.MAX_BYTES / 1e6:.0f} MB; no model of this program"
+                )
+            content = file.read_bytes()
+        except OSError as error:
+            raise ModelError(f"{file}: cannot be read ({error.strerror})") from error
+        session = _open(file, content, threads)
+        text = session.get_modelmeta().custom_metadata_map.get("downstream-hpe", "{}")
+        try:
+            facts = json.loads(text)
+            ranges = np.array(facts["range_deg"], dtype=np.float64)
+            subjects = frozenset(map(str, facts["trained_subjects"]))
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise ModelError(f"{file}: no downstream-hpe metadata; {EXPORT_AGAIN}") from error
+        if facts.get("format") != FORMAT:
+            raise ModelError(f"{file}: format {facts.get('format')!r}, expected {FORMAT!r}")
+        if ranges.shape != (3, 2) or not (ranges[:, 0] < ranges[:, 1]).all():
+            raise ModelError(f"{file}: its trained range is no range of three angles; {EXPORT_AGAIN}")
+        found = {v.name: (v.type, v.shape[1:]) for v in (*session.get_inputs(), *session.get_outputs())}
+        for name, shape in SHAPES.items():
+            optional = name == "confidence" and name not in found
+            if not optional and found.get(name) != ("tensor(float)", shape):
+                raise ModelError(f"{file}: {name} is not float [N{''.join(f', {n}' for n in shape)}]")
+        return Predictor(session, ranges, subjects, facts.get("pose_zero"), str(file))
+
+    def in_range(self, ypr_deg: np.ndarray) -> Any:
+        """Whether all three angles are among those the model was trained on: float [..., 3] -> bool [...]."""
+        low, high = self.range_deg.T
+        return ((ypr_deg >= low) & (ypr_deg <= high)).all(axis=-1)
+
+    def from_landmarks(self, landmarks: np.ndarray) -> Pose:
+        """Pose of faces given by their landmarks.
+
+        landmarks: float [N, 468, 3], MediaPipe's order, isotropic (x, y, z in one unit, such as
+        x * width, y * height, z * width of MediaPipe's output), frame C.
+
+        Raises
+        ------
+        DataError: another shape, or landmarks that are not finite.
+        """
+        points = np.asarray(landmarks, dtype=np.float32)
+        if points.ndim != 3 or points.shape[1:] != (POINTS, 3):
+            raise DataError(f"expected landmarks of shape [N, {POINTS}, 3], got {points.shape}")
+        if not np.isfinite(points).all():
+            raise DataError("landmarks are not finite; leave out faces that were not detected")
+        if not len(points):
+            none = {name: np.empty((0, *SHAPES[name]), dtype=np.float32) for name in self._outputs}
+            return _pose(none)
+        try:
+            values = self._session.run(self._outputs, {"landmarks": points})
+        except _faults() as error:
+            raise ModelError(
+                f"{self._name}: fails on landmarks ({type(error).__name__}); {EXPORT_AGAIN}"
+            ) from error
+        found = dict(zip(self._outputs, values, strict=True))
+        if not all(np.isfinite(value).all() for value in found.values()):
+            if (np.ptp(points, axis=1) == 0).all(axis=1).any():
+                raise DataError(
+                    "the landmarks of a face all coincide; leave out faces that were not detected"
+                )
+            raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
+        return _pose(found)
+
+    def from_image(self, bgr: np.ndarray, faces: int = 1) -> Pose | None:
+        """Pose of the most prominent faces of a picture, at most so many; None where no face is found.
+
+        bgr: uint8 [H, W, 3]. Needs mediapipe, which is opened on the first call.
+        """
+        points = self.faces(bgr, faces)
+        return self.from_landmarks(points) if len(points) else None
+
+    def faces(self, bgr: np.ndarray, limit: int = 1) -> np.ndarray:
+        """Landmarks of the most prominent faces, as :meth:`FaceDetector.faces` gives them."""
+        return self._detector.faces(bgr, limit)
+
+    def close(self) -> None:
+        """Free the face detector, if one was opened."""
+        self._detector.close()
+
+
+def shipped_models() -> list[str]:
+    """Names of the models that come with the package."""
+    return sorted(file.stem for file in MODELS.glob("*.onnx"))
+
+
+def model_folder(model: Path | str) -> Path | None:
+    """The folder of `downstream-hpe fit` that is meant; None for a model's name and for a single file."""
+    # A path with a folder in it (./headturn) or a Path is never a name.
+    named = isinstance(model, str) and model in shipped_models()
+    return Path(model) if not named and Path(model).is_dir() else None
+
+
+def _file_of(model: Path | str) -> Path:
+    if isinstance(model, str) and model in shipped_models():
+        return MODELS / f"{model}.onnx"
+    folder = model_folder(model)
+    file = Path(model) if folder is None else folder / MODEL_FILE
+    if not file.is_file():
+        raise ModelError(
+            f"{file}: no such model; expected a folder of downstream-hpe fit, an .onnx file, or one of the "
+            f"models that come with this program: {', '.join(shipped_models()) or 'none'}"
+        )
+    return file
+
+
+def _open(file: Path, content: bytes, threads: int) -> Any:
+    try:
+        import onnxruntime as ort
+    except ImportError as error:
+        raise ModelError("onnxruntime is not installed: pip install 'headturn[pose]'") from error
+    reason = onnx_file.fault(content)
+    if reason is not None:
+        raise ModelError(f"{file}: not a readable ONNX model of this program ({reason})")
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.log_severity_level = 4
+    try:
+        return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except _faults() as error:
+        # Its own text is long and speaks of its source files; the cause keeps it.
+        reason = f"onnxruntime {ort.__version__} refuses it: {type(error).__name__}"
+        opset, ir_version = onnx_file.versions(content)
+        if opset > onnx_file.OPSET or ir_version > onnx_file.IR_VERSION:
+            reason += f"; operator set {opset} or IR version {ir_version} may be too new for it"
+        raise ModelError(f"{file}: not a readable ONNX model ({reason}); {EXPORT_AGAIN}") from error
+
+
+def _faults() -> tuple[type[Exception], ...]:
+    """What onnxruntime raises; its exceptions have no base of their own."""
+    from onnxruntime.capi import onnxruntime_pybind11_state as faults
+
+    theirs = [e for e in vars(faults).values() if isinstance(e, type) and issubclass(e, Exception)]
+    return (*theirs, RuntimeError, MemoryError)
+
+
+def _pose(found: dict[str, np.ndarray]) -> Pose:
+    return Pose(found["ypr_deg"], found["rotation"], found.get("confidence"))

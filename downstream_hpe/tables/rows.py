@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Rows of a table in memory: those with a face, and where those without one are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.dataset as ds
+
+from downstream_hpe.errors import DataError
+from downstream_hpe.tables.columns import (
+    ANGLE_COLUMNS,
+    HEAD_COLUMNS,
+    angles_of,
+    check_rows,
+    column,
+    landmarks_of,
+    vectors,
+)
+from downstream_hpe.tables.open import open_tables
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Detected rows, in memory.
+
+    heads      str [N], "subject/expression"; subjects str [N]: what a split must not divide
+    ypr_deg    float64 [N, 3]; rotation float64 [N, 3, 3], R_C
+    landmarks  float32 [N, 468, 3], isotropic pixels, frame C
+    undetected number of rows left out because no face was found
+    """
+
+    heads: np.ndarray
+    subjects: np.ndarray
+    ypr_deg: np.ndarray
+    rotation: np.ndarray
+    landmarks: np.ndarray
+    undetected: int
+
+    def __len__(self) -> int:
+        return len(self.ypr_deg)
+
+    def take(self, chosen: np.ndarray) -> Rows:
+        """The chosen rows. chosen: bool or int, as numpy indexes."""
+        arrays = (self.heads, self.subjects, self.ypr_deg, self.rotation, self.landmarks)
+        heads, subjects, ypr_deg, rotation, points = (array[chosen] for array in arrays)
+        return Rows(heads, subjects, ypr_deg, rotation, points, 0)
+
+    @staticmethod
+    def joined(parts: Sequence[Rows]) -> Rows:
+        """The rows of several, one after the other."""
+        names = ("heads", "subjects", "ypr_deg", "rotation", "landmarks")
+        arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        heads, subjects, ypr_deg, rotation, points = arrays
+        return Rows(heads, subjects, ypr_deg, rotation, points, sum(part.undetected for part in parts))
+
+
+def read_rows(path: Path | str, split: str | None = None) -> Rows:
+    """Every detected row, in the order of the files.
+
+    split: only the rows of this split; None: all of them.
+
+    Raises
+    ------
+    DataError: as :func:`open_tables`; no detected row; a row whose rotation is not that of its
+        angles, or whose landmarks are not finite although it is marked detected.
+    """
+    columns = [*HEAD_COLUMNS, "split", *ANGLE_COLUMNS, "rotation", "detected", "landmarks"]
+    tables = open_tables(path, columns)
+    chosen = None if split is None else ds.field("split") == split
+    found: list[tuple[np.ndarray, ...]] = []
+    undetected = 0
+    for batch in tables.batches(columns, chosen):
+        detected = column(batch, "detected")
+        check_rows(tables.path, batch)
+        undetected += int((~detected).sum())
+        subjects = column(batch, "subject")
+        heads = np.array([f"{s}/{e}" for s, e in zip(subjects, column(batch, "expression"), strict=True)])
+        rotation = vectors(batch, "rotation", 9).reshape(-1, 3, 3)
+        values = (heads, subjects, angles_of(batch), rotation, landmarks_of(batch))
+        found.append(tuple(value[detected] for value in values))
+    if not sum(len(values[0]) for values in found):
+        of = f" of split {split!r}" if split else ""
+        raise DataError(f"{tables.path}: no row{of} with a detected face; nothing to read")
+    every = (np.concatenate(values) for values in zip(*found, strict=True))
+    all_heads, all_subjects, ypr_deg, rotation, points = every
+    return Rows(all_heads, all_subjects, ypr_deg, rotation, points, undetected)
+
+
+def read_missed(path: Path | str, split: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The rows that :func:`read_rows` leaves out: their subjects, str [M], and angles, float64 [M, 3]."""
+    columns = ["subject", "split", *ANGLE_COLUMNS, "detected"]
+    where = ~ds.field("detected")
+    if split is not None:
+        where &= ds.field("split") == split
+    batches = list(open_tables(path, columns).batches(columns, where))
+    subjects = [str(name) for batch in batches for name in column(batch, "subject")]
+    return np.array(subjects, dtype=np.str_), np.concatenate([np.empty((0, 3)), *map(angles_of, batches)])
