@@ -9,12 +9,11 @@ units follow from these classes; see docs/architecture.md. stdlib only: Blender 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import MISSING, dataclass, field, fields
-from typing import Any, Literal, TypeVar, cast, get_type_hints
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, Literal, get_type_hints
 
 from generator import registries
-
-T = TypeVar("T")
+from generator.plan.setting import Choice, Setting, setting
 
 PARAMETRIC = "parametric"
 """The head source that is made on the spot."""
@@ -23,84 +22,6 @@ PRESET_SAMPLES = {"fast": 1, "quality": 4}
 """Cycles samples a pixel of each preset, where none are asked for."""
 
 Projection = Literal["perspective", "orthographic"]
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One of the values a setting may have. label, help: for people; the label follows from the value."""
-
-    value: str
-    help: str = ""
-    label: str = ""
-
-    @property
-    def name(self) -> str:
-        """What people read."""
-        return self.label or self.value.replace("_", " ").capitalize()
-
-
-@dataclass(frozen=True)
-class Info:
-    """What is known of a setting besides its name, type and default.
-
-    help       one sentence without its full stop
-    unit       of the value, such as "mm"; "" for none
-    low, high, above   smallest, largest, and "more than", of each number
-    choices    of texts; none where everything goes
-    flag       of the command line. Settings of one section that share a flag are given together, with
-               commas; settings of several sections that share one all get its value. "" for none
-    label      in Blender's panel; "" leaves it out of the panel
-    grows      it chooses rows and does not change what is in one, so a dataset may grow along it
-    content    it decides pixels or labels, and enters the name of a unit where it is not the default (what
-               [heads] and [poses] decide is in the head's files, its placement and the poses)
-    path       of a file or folder; a relative one counts from the configuration file
-    """
-
-    help: str
-    unit: str = ""
-    low: float | None = None
-    high: float | None = None
-    above: float | None = None
-    choices: tuple[Choice, ...] | Callable[[], tuple[Choice, ...]] = ()
-    flag: str | None = None
-    label: str = ""
-    grows: bool = False
-    content: bool = True
-    path: bool = False
-
-
-def setting(default: T, help: str, **info: Any) -> T:
-    """A field of a section. info: see :class:`Info`."""
-    return cast(T, field(default=default, metadata={"info": Info(help, **info)}))
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One setting as others see it. kind: its type, such as ``float`` or ``tuple[str, ...]``."""
-
-    section: str
-    key: str
-    kind: Any
-    default: Any
-    info: Info
-
-    @property
-    def name(self) -> str:
-        """Such as "render.lens_mm"."""
-        return f"{self.section}.{self.key}"
-
-    @property
-    def choices(self) -> tuple[Choice, ...]:
-        """The values it may have; none where everything goes."""
-        found = self.info.choices
-        return found() if callable(found) else found
-
-    @property
-    def flag(self) -> str:
-        """Its option of the command line, "" if it has none: the key without its unit."""
-        if self.info.flag is not None:
-            return self.info.flag
-        return "--" + self.key.removesuffix("_mm").removesuffix("_deg").replace("_", "-")
 
 
 _AXES = tuple(Choice(sign + axis, label=sign + axis) for axis in "XYZ" for sign in "+-")

@@ -14,7 +14,8 @@ import sys
 import time
 from pathlib import Path
 
-from generator.blender import scene, worker
+from generator.blender import images, worker
+from generator.plan.views import View
 
 GROWN = []
 
@@ -32,21 +33,21 @@ def grow() -> None:
 
 
 FAULTS = {"crash": crash, "hang": hang, "grow": grow}
-render_well = scene.Stage.render
+render_well = images.Images.render
 
 
-def render(self: scene.Stage, ypr_deg: list[float], path: Path) -> None:
+def render(self: images.Images, view: View, path: Path) -> None:
     once = os.environ.get("FAULT_ONCE")
-    if ypr_deg[0] == float(os.environ["FAULT_YAW"]) and not (once and Path(once).exists()):
+    if view.pose[0] == float(os.environ["FAULT_YAW"]) and not (once and Path(once).exists()):
         if once:
             Path(once).touch()
         print("this is the faulty pose", file=sys.stderr, flush=True)
         FAULTS[os.environ["FAULT"]]()
-    render_well(self, ypr_deg, path)
+    render_well(self, view, path)
 
 
 if "--version" in sys.argv:
     print("Blender 4.5.0")
     sys.exit()
-scene.Stage.render = render
+images.Images.render = render
 worker.main(threads=int(sys.argv[-1]))
