@@ -10,7 +10,8 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import typer
 
 from generator.errors import UsageError
-from generator.plan.settings import Setting, Values
+from generator.plan.setting import Setting
+from generator.plan.settings import Values
 
 SHOWN_CHOICES = 6
 """How many choices stand in the place of a value; more are in the message of a wrong one."""

@@ -12,7 +12,8 @@ from generator.cli.console import BlenderOption, out
 from generator.cli.options import numbers, with_settings
 from generator.errors import UsageError
 from generator.plan.config import load_config
-from generator.plan.settings import Setting, Values, all_settings
+from generator.plan.setting import Setting
+from generator.plan.settings import Values, all_settings
 
 DEFAULTS = {"render.preset": "quality", "render.resolution": 512}
 """Of a picture that somebody looks at."""
