@@ -70,10 +70,10 @@ class Images:
         render_passes(path, stage.head, passes)
 
     def _show(self, view: View) -> Stage:
-        if self._stage is None or self._stage.preset != view.look.preset:
+        if self._stage is None or not self._stage.fits(view.look):
             self._stage = None
             bpy.ops.wm.read_factory_settings(use_empty=True)
-            self._stage = Stage(bpy.context.scene, self._mesh, view.look.preset, threads=self._threads)
+            self._stage = Stage(bpy.context.scene, self._mesh, view.look, threads=self._threads)
         self._stage.show(view)
         return self._stage
 

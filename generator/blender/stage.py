@@ -33,14 +33,16 @@ class Stage:
     Parameters
     ----------
     mesh: frame U, mm, pivot at the origin.
-    preset: of :class:`generator.plan.settings.Look`; another one needs another stage.
+    look: of the first view. Its preset and samples stay; see :meth:`fits`.
     threads: of Cycles; 0 lets Blender take every core.
 
     Raises FileNotFoundError or RuntimeError if a texture cannot be read.
     """
 
-    def __init__(self, scene: bpy.types.Scene, mesh: HeadMesh, preset: str, *, threads: int = 0) -> None:
-        self.scene, self.preset = scene, preset
+    def __init__(self, scene: bpy.types.Scene, mesh: HeadMesh, look: Look, *, threads: int = 0) -> None:
+        self.scene = scene
+        self._kind = _kind(look)
+        preset = look.preset
         self.head = _build_head(mesh, preset)
         scene.collection.objects.link(self.head)
         if preset == "fast":
@@ -50,22 +52,30 @@ class Stage:
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(self._camera)
         scene.camera = self._camera
-        _set_render(scene, preset, threads)
+        _set_render(scene, look, threads)
         self._seen_by: Camera | None = None
         self._look: Look | None = None
 
+    def fits(self, look: Look) -> bool:
+        """Can this stage show a look? Another preset has other materials, and Cycles keeps the sampling
+        pattern of its first number of samples: the image would depend on what was rendered before."""
+        return _kind(look) == self._kind
+
     def show(self, view: View) -> None:
-        """Set pose, camera and look. What stays as it was is not touched. ValueError for another preset."""
-        if view.look.preset != self.preset:
-            raise ValueError(f"a stage for {self.preset} cannot show {view.look.preset}")
+        """Set pose, camera and look. What stays as it was is not touched. ValueError if it does not fit."""
+        if not self.fits(view.look):
+            raise ValueError(f"a stage for {self._kind} cannot show {_kind(view.look)}")
         turn(self.head, view.pose)
         if view.camera != self._seen_by:
             set_camera(self.scene, self._camera, view.camera)
             self._seen_by = view.camera
         if view.look != self._look:
             self._light.set(view.look)
-            self.scene.cycles.samples = view.look.cycles_samples
             self._look = view.look
+
+
+def _kind(look: Look) -> tuple[str, int]:
+    return look.preset, look.cycles_samples
 
 
 def turn(head: bpy.types.Object, ypr_deg: Sequence[float]) -> None:
@@ -137,7 +147,7 @@ def _build_head(mesh: HeadMesh, preset: str) -> bpy.types.Object:
     return bpy.data.objects.new("head", made)
 
 
-def _set_render(scene: bpy.types.Scene, preset: str, threads: int) -> None:
+def _set_render(scene: bpy.types.Scene, look: Look, threads: int) -> None:
     """What is the same for every view."""
     render = scene.render
     render.engine = "CYCLES"
@@ -157,7 +167,8 @@ def _set_render(scene: bpy.types.Scene, preset: str, threads: int) -> None:
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.use_light_tree = False
-    bounces = 0 if preset == "fast" else QUALITY_BOUNCES
+    cycles.samples = look.cycles_samples
+    bounces = 0 if look.preset == "fast" else QUALITY_BOUNCES
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.transmission_bounces = cycles.volume_bounces = 0
     cycles.transparent_max_bounces = 8

@@ -127,8 +127,14 @@ class Renderer:
         """
         kind = "exr" if passes else kind
         self._send(RenderOrder(str(package), views, str(self.images), kind, tuple(passes)))
-        for receipt in self._receipts():
-            yield Path(receipt.path)
+        receipts = self._receipts()
+        try:
+            for receipt in receipts:
+                yield Path(receipt.path)
+        except GeneratorExit:
+            # Whoever asks next must not get the rest of these.
+            for _ in receipts:
+                pass
 
     def import_mesh(self, source: Path, folder: Path) -> Path:
         """Have Blender read an FBX file and write it into folder as GLB, whose path is returned."""
