@@ -62,3 +62,7 @@ HEAD_FINDERS: Registry[Any] = Registry(
 
 HEAD_MAKERS: Registry[Any] = Registry("--heads", {"parametric": "generator.heads.parametric.make:MAKER"})
 """Heads made on the spot, by ``--heads NAME`` or ``NAME:ARGUMENT``: a :class:`generator.heads.head.Maker`."""
+
+DRAWS: Registry[Any] = Registry("draw", {})
+"""What differs from image to image besides the pose: a :data:`generator.plan.view_plan.Draw` by the name of
+what it draws. Its generator depends on seed, head, pose and that name alone. There is none yet."""

@@ -26,7 +26,8 @@ from generator.heads.placement import Placement
 from generator.heads.source import find_heads
 from generator.messages import BuildOrder, Built, expect
 from generator.plan.config import BuildConfig, recorded_config
-from generator.plan.views import Pose, plan_views
+from generator.plan.view_plan import plan_views
+from generator.plan.views import Pose
 
 COMPARED = ("landmarks", "landmarks_exact")
 
@@ -151,7 +152,7 @@ def _order(
         correction_sd_deg=row.correction_sd_deg,
     )
     pose: Pose = (recorded["yaw_deg"], recorded["pitch_deg"], recorded["roll_deg"])
-    views = plan_views(config.render, row.radius_mm, [pose])
+    views = plan_views(config, head.name, row.radius_mm, [pose])
     indices = (recorded["yaw_index"], recorded["pitch_index"], recorded["roll_index"])
     order = build_order(head, placement, points, row.split, views, (indices,), config, root)
     return replace(order, unit="again", images="embedded")

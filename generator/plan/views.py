@@ -12,8 +12,8 @@ from typing import TypeVar, overload
 
 import numpy as np
 
-from generator.geometry.camera import Camera, framing_distance
-from generator.plan.settings import Lens, Look, Render
+from generator.geometry.camera import Camera
+from generator.plan.settings import Look
 
 T = TypeVar("T")
 
@@ -82,23 +82,6 @@ class Views(Sequence[View]):
     def angles_deg(self) -> np.ndarray:
         """float64 [N, 3], (yaw, pitch, roll)."""
         return np.array(self.poses, dtype=np.float64).reshape(-1, 3)
-
-
-def framed_camera(lens: Lens, radius_mm: float) -> Camera:
-    """The camera of a lens before a head.
-
-    radius_mm: of the sphere about the pivot that holds the head. Its distance is the one that was
-    asked for, or where the head just fits, rounded to 0.01 mm.
-    """
-    distance = lens.distance_mm
-    if distance is None:
-        distance = round(framing_distance(radius_mm, lens.lens_mm, lens.margin, lens.projection), 2)
-    return Camera.square(lens.resolution, lens.lens_mm, distance, lens.projection)
-
-
-def plan_views(render: Render, radius_mm: float, poses: Sequence[Pose]) -> Views:
-    """The views of a head at some poses. radius_mm: as in :func:`framed_camera`."""
-    return Views(tuple(poses), (framed_camera(render, radius_mm),), (render.look,))
 
 
 def _once(values: list[T]) -> tuple[T, ...]:

@@ -20,7 +20,8 @@ from generator.heads.mesh import HeadMesh, Material
 from generator.heads.package import save_package
 from generator.plan.poses import grid_plan
 from generator.plan.settings import Look, Render
-from generator.plan.views import View, Views, framed_camera
+from generator.plan.view_plan import framed_camera
+from generator.plan.views import View, Views
 
 FLAT = Look(ambient=1.0, samples=4)
 MARKS = {"nose": ((0, 0, 70), (1, 0, 0)), "crown": ((0, 70, 0), (0, 1, 0)), "left": ((70, 0, 0), (0, 0, 1))}

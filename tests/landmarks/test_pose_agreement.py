@@ -20,8 +20,9 @@ from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.landmarks.reference_face import fit_pose, reference_face
 from generator.placing.face import find_face
 from generator.placing.rendering import read_image
+from generator.plan.config import BuildConfig
 from generator.plan.settings import Render
-from generator.plan.views import plan_views
+from generator.plan.view_plan import plan_views
 
 POSES = np.array(
     [
@@ -37,7 +38,7 @@ POSES = np.array(
     ],
     dtype=float,
 )
-LOOK = Render(resolution=256, lens_mm=135.0, samples=2)
+LOOK = BuildConfig(render=Render(resolution=256, lens_mm=135.0, samples=2))
 
 
 def disagreement(
@@ -46,7 +47,7 @@ def disagreement(
     """Geodesic degrees between label and detector, the head's one constant offset taken out."""
     package = folder / "head.npz"
     save_package(mesh, package)
-    views = plan_views(LOOK, radius_mm, [tuple(pose) for pose in POSES.tolist()])
+    views = plan_views(LOOK, "a/neutral", radius_mm, [tuple(pose) for pose in POSES.tolist()])
     labels, seen = [], []
     for pose, path in zip(POSES, renderer.render(package, views), strict=True):
         found = detector.detect(read_image(path))
@@ -84,7 +85,9 @@ def test_landmarks_are_isotropic_pixels(
     """x and y lie on the face in the image, z shrinks towards the camera at the nose."""
     package = tmp_path / "head.npz"
     save_package(placed_head.mesh, package)
-    [path] = renderer.render(package, plan_views(LOOK, placed_head.placement.radius_mm, [(0, 0, 0)]))
+    [path] = renderer.render(
+        package, plan_views(LOOK, "a/neutral", placed_head.placement.radius_mm, [(0, 0, 0)])
+    )
     found = detector.detect(read_image(path))
     assert found.shape == (468, 3)
     assert found.dtype == np.float32

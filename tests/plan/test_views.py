@@ -7,8 +7,10 @@ import pytest
 
 from generator.codec import from_plain, to_plain
 from generator.geometry.camera import Camera, framing_distance
+from generator.plan.config import BuildConfig
 from generator.plan.settings import Look, Render
-from generator.plan.views import View, Views, framed_camera, plan_views
+from generator.plan.view_plan import framed_camera, plan_views
+from generator.plan.views import View, Views
 
 POSES = ((0.0, 0.0, 0.0), (10.0, 0.0, 5.0), (-3.5, 2.0, 1.0))
 NEAR, FAR = Camera.square(64, 85.0, 500.0), Camera(64, 48, 200.0, 3000.0, principal_px=(30.0, 20.0))
@@ -36,7 +38,8 @@ def test_a_head_is_framed_unless_a_distance_is_given() -> None:
     expected = round(framing_distance(120.0, 85.0, 1.05), 2)
     assert framed_camera(Render(), 120.0) == Camera(256, 256, 85.0, expected)
     assert framed_camera(Render(distance_mm=2000.0), 120.0).distance_mm == 2000.0
-    views = plan_views(Render(background=(0.0, 0.0, 1.0)), 120.0, POSES)
+    config = BuildConfig(render=Render(background=(0.0, 0.0, 1.0)))
+    views = plan_views(config, "a/neutral", 120.0, POSES)
     assert views.looks[0].background == (0.0, 0.0, 1.0) and views.poses == POSES
 
 

@@ -24,7 +24,8 @@ from generator.landmarks.anchors import Anchors
 from generator.messages import BuildOrder
 from generator.plan.config import BuildConfig
 from generator.plan.settings import ROWS, beyond_defaults
-from generator.plan.views import Views, framed_camera, plan_views
+from generator.plan.view_plan import framed_camera, plan_views
+from generator.plan.views import Views
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def plan_units(
         )
         earlier = first_release.names(planned, config, recorded_versions, versions)
         for chunk in poses.of(head.subject, head.expression):
-            views = plan_views(config.render, planned.placement.radius_mm, chunk.poses)
+            views = plan_views(config, head.name, planned.placement.radius_mm, chunk.poses)
             seen = [to_plain(views.cameras), to_plain(views.looks)]
 
             def name(indices: Any, chunk: Chunk = chunk, seen: Any = seen, fixed: str = fixed) -> str:

@@ -18,7 +18,7 @@ from generator.heads.package import save_package
 from generator.heads.source import find_heads
 from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig
-from generator.plan.views import plan_views
+from generator.plan.view_plan import plan_views
 from generator.process import native_silence
 
 DOT = (80, 255, 80)
@@ -65,7 +65,7 @@ def render_preview(
             placement = lane.placer(config.landmarks).face(head, mesh)
             package = scratch / "preview.npz"
             save_package(placement.normalise(mesh), package)
-            [path] = lane.renderer.render(package, plan_views(config.render, placement.radius_mm, [pose]))
+            [path] = lane.renderer.render(package, plan_views(config, head.name, placement.radius_mm, [pose]))
             image = read_image(path)
             found = lane.detector(config.landmarks).detect(image)
         finally:

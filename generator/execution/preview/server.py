@@ -51,7 +51,8 @@ from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.pose_plans import plan_poses
 from generator.plan.settings import Values
-from generator.plan.views import Pose, Views, plan_views
+from generator.plan.view_plan import plan_views
+from generator.plan.views import Pose, Views
 
 
 class _Quiet:
@@ -123,7 +124,7 @@ class PreviewServer:
         landmarks: bool,
         sheet: int = 0,
     ) -> dict[str, Any]:
-        views = plan_views(config.render, radius_mm, poses)
+        views = plan_views(config, Path(package).stem, radius_mm, poses)
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths, found, tiles = [], [], []
@@ -156,8 +157,9 @@ class PreviewServer:
             placement = self._placement(config, subject)
             package = self._scratch / "thumbnail.npz"
             self._package(head, placement, package)
-            small = load_config(None, {"render": {"resolution": pixels}}).render
-            [image] = self._render(package, plan_views(small, placement.radius_mm, [(0.0, 0.0, 0.0)]))
+            small = load_config(None, {"render": {"resolution": pixels}})
+            views = plan_views(small, head.name, placement.radius_mm, [(0.0, 0.0, 0.0)])
+            [image] = self._render(package, views)
             picture.parent.mkdir(parents=True, exist_ok=True)
             half = picture.with_name(f".{os.getpid()}-{picture.name}")  # another Blender may write it too
             _write(image, half)
