@@ -77,7 +77,7 @@ class NoRenderer:
             redistributable=head["redistributable"],
             angles_deg=np.array(order["poses"]),
             indices=np.array(order["indices"], dtype=np.int16),
-            camera=Camera(256, 85.0, order["distance_mm"]),
+            cameras=(Camera(256, 85.0, order["distance_mm"]),),
             detected=np.ones(count, dtype=bool),
             landmarks=np.full((count, POINTS, 3), 128.0, dtype=np.float32),
             anchors=np.full((POINTS, 3), np.nan),

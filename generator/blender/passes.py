@@ -10,15 +10,8 @@ from pathlib import Path
 import bpy
 
 from generator.blender import compat
-
-SWITCHES = {
-    "depth": "use_pass_z",
-    "normal": "use_pass_normal",
-    "position": "use_pass_position",
-    "uv": "use_pass_uv",
-    "object_index": "use_pass_object_index",
-}
-"""Pass to the view layer's property; the same in Blender 4.2 to 5.x."""
+from generator.plan.passes import OBJECT_INDEX
+from generator.registries import PASSES
 
 HEAD_INDEX = 1
 
@@ -29,16 +22,17 @@ CENTRE_ONLY = 0.01
 def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> None:
     """Render passes of the scene as it stands into path, as Blender names them.
 
-    Where there is no surface object_index is 0, so it is always among them. Raises KeyError
-    for a pass that is none of :data:`SWITCHES`.
+    Where there is no surface object_index is 0, so it is always among them. Raises UsageError
+    for a pass that is none of :data:`generator.registries.PASSES`.
     """
     scene = bpy.context.scene
     render = scene.render
     head.pass_index = HEAD_INDEX
     layer = scene.view_layers[0]
-    wanted = {SWITCHES[name] for name in (*passes, "object_index")}
+    switches = {PASSES.get(name).switch for name in PASSES}
+    wanted = {OBJECT_INDEX.switch, *(PASSES.get(name).switch for name in passes)}
     with _restored(scene.cycles, "samples", "pixel_filter_type", "filter_width"):
-        for switch in SWITCHES.values():
+        for switch in switches:
             setattr(layer, switch, switch in wanted)
         scene.cycles.samples = 1
         scene.cycles.pixel_filter_type = "BOX"
@@ -47,7 +41,7 @@ def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> 
         render.use_border = False
         render.filepath = str(path)
         bpy.ops.render.render(write_still=True)
-    for switch in SWITCHES.values():
+    for switch in switches:
         setattr(layer, switch, False)
 
 

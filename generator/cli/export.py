@@ -5,58 +5,31 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
 from generator.cli.console import JsonFlag, err, out
 from generator.cli.reporter import TerminalReporter
+from generator.registries import FORMATS
 
-
-class FormatName(str, Enum):
-    """Choices of --format."""
-
-    nlml_hpe = "nlml-hpe"
-    w300_lp = "300w-lp"
-    sixdrepnet = "6drepnet"
-    biwi = "biwi"
-    huggingface = "huggingface"
-    croissant = "croissant"
-    coco = "coco"
-
-
-class LandmarksName(str, Enum):
-    """Choices of --landmarks."""
-
-    auto = "auto"
-    exact = "exact"
-    detected = "detected"
-
-
-class MissingName(str, Enum):
-    """Choices of --missing."""
-
-    keep = "keep"
-    skip = "skip"
-    exact = "exact"
-    fail = "fail"
+_FORMATS = ", ".join(FORMATS)
 
 
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A dataset made by headturn build.")],
-    format_: Annotated[FormatName, typer.Option("--format", help="The form to write.")],
+    format_: Annotated[str, typer.Option("--format", help=f"The form to write: {_FORMATS}.")],
     target: Annotated[Path, typer.Option("--out", help="Folder of the export; must be new or empty.")],
     landmarks: Annotated[
-        LandmarksName,
+        str,
         typer.Option(
-            help="Of formats with landmarks: the mesh's, the detector's; auto: the mesh's if all have."
+            help="Of formats with landmarks: exact (the mesh's), detected, or auto: the mesh's if all have."
         ),
-    ] = LandmarksName.auto,
+    ] = "auto",
     missing: Annotated[
-        MissingName | None,
-        typer.Option(help="Rows without a detection or landmarks: keep, skip, fill with exact, or fail."),
+        str | None,
+        typer.Option(help="Rows without a detection or landmarks: fail, keep, skip, or exact to fill."),
     ] = None,
     public: Annotated[
         bool, typer.Option("--public", help="It will be published, whatever the format.")
@@ -74,20 +47,23 @@ def export(
 
     huggingface and croissant are meant for publication: they refuse heads that may not be published.
     """
-    from generator.dataset.export.options import ExportOptions
+    from generator.dataset.export.options import ExportOptions, Landmarks
     from generator.dataset.export.run import export_dataset
     from generator.dataset.format.manifest import read_manifest
+    from generator.dataset.format.missing import Missing
 
+    FORMATS.get(format_)  # before anything is read
+    # Both are checked where they are used, against what the format takes.
     options = ExportOptions(
-        landmarks=landmarks.value,
-        missing=missing.value if missing else None,
+        landmarks=cast(Landmarks, landmarks),
+        missing=cast("Missing | None", missing),
         public=public,
         only_redistributable=only_redistributable,
         may_publish=may_publish,
     )
     with TerminalReporter(err) as reporter:
-        reporter.stage(f"{format_.value} export", read_manifest(folder).rows)
-        done = export_dataset(folder, format_.value, target, options, reporter.advance)
+        reporter.stage(f"{format_} export", read_manifest(folder).rows)
+        done = export_dataset(folder, format_, target, options, reporter.advance)
     if as_json:
         typer.echo(json.dumps({**asdict(done), "target": str(done.target)}))
         return

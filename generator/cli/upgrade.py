@@ -1,8 +1,49 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``headturn upgrade``."""
+"""``headturn upgrade``: a dataset of an earlier schema as one of today's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from generator.cli.console import JsonFlag, err, out
+from generator.cli.reporter import TerminalReporter
+
+
+def upgrade(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A finished dataset.")],
+    target: Annotated[
+        Path | None, typer.Option("--out", help="Write it there and leave DIR as it is; else in its place.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Rewrite a dataset to the schema of this version. Every command also reads it as it is.
+
+    The columns that it lacks hold their defaults, so its digest changes. Rows and labels do not.
+    """
+    from generator.dataset.format.upgrade import upgrade_dataset
+
+    with TerminalReporter(err) as reporter:
+        done = upgrade_dataset(folder, target, reporter=reporter)
+    now = done.manifest.schema_version
+    if as_json:
+        facts = {"dataset": str(done.root), "changed": done.changed, "before": done.before}
+        typer.echo(json.dumps({**facts, "schema_version": now, "digest": done.manifest.digest}))
+    elif done.changed:
+        out.print(
+            f"{done.root}: schema {done.before} -> {now}, {done.manifest.rows} rows, "
+            f"digest {done.manifest.digest}",
+            highlight=False,
+            markup=False,
+            soft_wrap=True,
+        )
+    else:
+        out.print(f"{done.root}: of schema {now} already, nothing to do", highlight=False, soft_wrap=True)
+
 
 def register(app: typer.Typer) -> None:
-    """Nothing yet."""
+    """Add the command."""
+    app.command(epilog="Example: headturn upgrade dataset --out dataset-upgraded")(upgrade)

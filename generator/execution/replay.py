@@ -14,8 +14,9 @@ from generator.dataset.format.anchors_table import read_anchors
 from generator.dataset.format.files import file_sha256, write_bytes
 from generator.dataset.format.heads_table import HeadRow, read_heads
 from generator.dataset.format.manifest import Manifest, read_manifest
-from generator.dataset.format.open import as_array, image_bytes, read_samples
+from generator.dataset.format.open import image_bytes, read_samples
 from generator.dataset.format.part import read_part
+from generator.dataset.proof.compare import row_differences
 from generator.errors import DatasetError, HeadError, UsageError, WorkerError
 from generator.execution.build.sources import source_path
 from generator.execution.build.units import build_order
@@ -28,8 +29,6 @@ from generator.messages import BuildOrder, Built, expect
 from generator.plan.config import BuildConfig, recorded_config
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Pose
-
-COMPARED = ("landmarks", "landmarks_exact")
 
 
 @dataclass(frozen=True)
@@ -92,10 +91,11 @@ def replay_sample(
             raise WorkerError(f"{sample_id}: cannot be rendered again: {outcome.error}")
         built = expect(Built, outcome.receipt)
         again = read_part(scratch / built.part.path)
-        image = image_bytes(scratch, again.to_pylist()[0])
+        now = again.to_pylist()[0]
+        image = image_bytes(scratch, now)
         if picture is not None:
             write_bytes(picture, image)
-        differences = [*_differences(recorded, again, image, root, manifest)]
+        differences = row_differences(recorded, now, lambda: _image_detail(recorded, image, root, manifest))
     versions = [
         f"{name}: {manifest.versions.get(name, 'none')} then, {now} now"
         for name, now in built.versions.items()
@@ -158,37 +158,14 @@ def _order(
     return replace(order, unit="again", images="embedded")
 
 
-def _differences(
-    recorded: dict[str, Any], again: Any, image: bytes, root: Path, manifest: Manifest
-) -> list[str]:
-    now = again.to_pylist()[0]
-    found = []
-    if now["image_sha256"] != recorded["image_sha256"]:
-        how = ""
-        if manifest.images != "none":
-            then = _decode(image_bytes(root, recorded))
-            difference = np.abs(_decode(image).astype(int) - then.astype(int))
-            share = (difference.max(axis=2) > 0).mean()
-            how = f": up to {difference.max()} of 255 levels, on {share:.2%} of its pixels"
-        found.append(f"the image differs{how}")
-    if now["passes_sha256"] != recorded["passes_sha256"]:
-        found.append("the floats of the passes differ")
-    if now["detected"] != recorded["detected"]:
-        found.append(f"detected was {recorded['detected']}, is {now['detected']}")
-    for name in COMPARED:
-        then = np.array(recorded[name], dtype=np.float64)
-        new = as_array(again, name).astype(np.float64).reshape(-1)
-        if not np.array_equal(then, new, equal_nan=True):
-            off = np.abs(then - new)
-            unit = "px" if name == "landmarks" else "mm"
-            most = f": up to {np.nanmax(off):.3g} {unit}" if np.isfinite(off).any() else ""
-            found.append(f"{name} differ{most}")
-    if now["landmarks_visible"] != recorded["landmarks_visible"]:
-        changed = np.not_equal(now["landmarks_visible"], recorded["landmarks_visible"]).sum()
-        found.append(f"landmarks_visible differ: {changed} of them")
-    labels = ("rotation", "camera", "translation_mm", "projection", "width", "height")
-    found += [f"{name} differs" for name in labels if now[name] != recorded[name]]
-    return found
+def _image_detail(recorded: dict[str, Any], image: bytes, root: Path, manifest: Manifest) -> str:
+    """How far two images are apart; "" where the first was not kept."""
+    if manifest.images == "none":
+        return ""
+    then = _decode(image_bytes(root, recorded))
+    difference = np.abs(_decode(image).astype(int) - then.astype(int))
+    share = (difference.max(axis=2) > 0).mean()
+    return f": up to {difference.max()} of 255 levels, on {share:.2%} of its pixels"
 
 
 def _decode(image: bytes) -> np.ndarray:

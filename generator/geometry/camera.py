@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -132,3 +133,28 @@ def project_with(matrix: np.ndarray, points_mm: np.ndarray, pivot_depth_mm: np.n
     ones = np.ones_like(points[..., :1])
     image = np.concatenate([points[..., :2] / depth, ones], axis=-1) @ np.swapaxes(matrix, -1, -2)
     return image[..., :2]
+
+
+def isotropic_pixels(
+    points_mm: np.ndarray, matrix: np.ndarray, translation_mm: np.ndarray, projection: Sequence[str]
+) -> np.ndarray:
+    """Points of many rows as a detector would give them: x and y as the row's camera sees them, z the
+    depth behind the pivot at the scale of the pivot, (Z - t_z) f / t_z, so that a unit is worth as
+    much along each axis.
+
+    Parameters
+    ----------
+    points_mm: float [N, P, 3], frame C. matrix: float [N, 3, 3], K. translation_mm: float [N, 3].
+    projection: N names, see :data:`Projection`.
+
+    Returns
+    -------
+    float64 [N, P, 3], pixels.
+    """
+    points = np.asarray(points_mm, dtype=np.float64)
+    k = np.asarray(matrix, dtype=np.float64).reshape(-1, 3, 3)
+    focal = np.stack([k[:, 0, 0], k[:, 1, 1]], axis=-1)[:, None]
+    distance = np.asarray(translation_mm, dtype=np.float64).reshape(-1, 3)[:, None, 2:]
+    parallel = np.array([name == "orthographic" for name in projection], dtype=bool)[:, None, None]
+    image = points[..., :2] / np.where(parallel, distance, points[..., 2:]) * focal + k[:, None, :2, 2]
+    return np.concatenate([image, (points[..., 2:] - distance) * focal[..., :1] / distance], axis=-1)

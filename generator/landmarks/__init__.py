@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmark detectors. Surface anchors (exact landmarks) will live here too."""
+"""Landmarks: what they are, who finds them, and where they lie on a mesh."""

@@ -8,22 +8,23 @@ from typing import Protocol
 import numpy as np
 
 from generator import registries
+from generator.landmarks.topology import FACE_MESH, Topology
 from generator.plan.settings import Landmarks
 
-TOPOLOGY = "mediapipe-face-mesh-468"
-POINTS = 468
-
-RIGHT_EYE_OUTER, LEFT_EYE_OUTER = 33, 263
-"""Outer eye corners of the subject's right (image left) and left eye."""
-
-CHIN, NOSE_TIP = 152, 1
+# Face Mesh's, by their short names. Code that may meet another detector takes them from its topology.
+TOPOLOGY, POINTS = FACE_MESH.name, FACE_MESH.count
+RIGHT_EYE_OUTER, LEFT_EYE_OUTER = FACE_MESH.right_eye_outer, FACE_MESH.left_eye_outer
+CHIN, NOSE_TIP = FACE_MESH.chin, FACE_MESH.nose_tip
 
 
 class Detector(Protocol):
-    """Finds the 468 points of MediaPipe Face Mesh, in its order."""
+    """Finds the points of one topology, in its order."""
 
     name: str
     """Name and version, for the dataset's metadata."""
+
+    topology: Topology
+    """What the points are; P = topology.count."""
 
     def detect(self, image: np.ndarray) -> np.ndarray | None:
         """Landmarks of the one face in an image.
@@ -34,8 +35,8 @@ class Detector(Protocol):
 
         Returns
         -------
-        float32 [468, 3] in isotropic pixels of frame C, (x W, y H, z W) of the
-        normalised output; or None if no face was found.
+        float32 [P, 3] in isotropic pixels of frame C, such as Face Mesh's (x W, y H, z W) of
+        the normalised output; or None if no face was found.
         """
         ...
 
@@ -45,6 +46,6 @@ class Detector(Protocol):
 
 
 def open_detector(landmarks: Landmarks) -> Detector:
-    """The detector of some settings. Raises UsageError: an unknown name. WorkerError: it cannot start."""
+    """The detector of some settings. UsageError: an unknown name. WorkerError: it cannot start."""
     detector: Detector = registries.DETECTORS.get(landmarks.detector)(landmarks.min_confidence)
     return detector

@@ -9,7 +9,7 @@ from importlib.metadata import version
 import numpy as np
 
 from generator.errors import WorkerError
-from generator.landmarks.detector import POINTS
+from generator.landmarks.topology import FACE_MESH
 
 # Must be set before the first import: keeps TensorFlow Lite's start-up notes out of the log.
 os.environ.setdefault("GLOG_minloglevel", "2")
@@ -22,6 +22,8 @@ class MediaPipeFaceMesh:
     Raises WorkerError if mediapipe is not installed or has no ``solutions``
     (0.10.30 and later ship no model).
     """
+
+    topology = FACE_MESH
 
     def __init__(self, min_confidence: float = 0.5) -> None:
         try:
@@ -45,8 +47,9 @@ class MediaPipeFaceMesh:
             return None
         height, width = image.shape[:2]
         points = np.array([(p.x, p.y, p.z) for p in found[0].landmark], dtype=np.float64)
-        if points.shape != (POINTS, 3):
-            raise WorkerError(f"expected {POINTS} landmarks from {self.name}, got {len(points)}")
+        expected = self.topology.count
+        if points.shape != (expected, 3):
+            raise WorkerError(f"expected {expected} landmarks from {self.name}, got {len(points)}")
         return (points * (width, height, width)).astype(np.float32)
 
     def close(self) -> None:

@@ -275,6 +275,19 @@ def section_settings(name: str, section: type) -> Iterator[Setting]:
         yield Setting(name, found.name, kinds[found.name], default, found.metadata["info"])
 
 
+def known_values(values: Values) -> Values:
+    """Values without those of settings that there are not."""
+    return {
+        name: {
+            known.key: values[name][known.key]
+            for known in section_settings(name, section)
+            if known.key in values[name]
+        }
+        for name, section in SECTIONS.items()
+        if isinstance(values.get(name), dict)
+    }
+
+
 def with_defaults(values: Values) -> Values:
     """Values of every setting: those given, else the default."""
     every: Values = {name: {} for name in SECTIONS}

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from known_error import build_known
 from small_dataset import HEADS, SMALL_PLAN, build_dataset, unit_rows
 
 from generator.dataset.format.manifest import Manifest
-from generator.dataset.format.part import UnitRows
+from generator.dataset.format.unit_rows import UnitRows
 
 
 @pytest.fixture(scope="session")
@@ -36,3 +37,9 @@ def _template(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def dataset(tmp_path: Path, _template: Path) -> Path:
     """A finished dataset of 2 heads x 18 poses in 4 parts, images as files; the test may damage it."""
     return Path(shutil.copytree(_template, tmp_path / "dataset"))
+
+
+@pytest.fixture(scope="session")
+def known(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset whose detector is off by a known error; nobody changes it."""
+    return build_known(tmp_path_factory.mktemp("known") / "dataset")

@@ -11,14 +11,16 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from generator.dataset.format.anchors_table import HeadAnchors, write_anchors
+from generator.dataset.format.columns import ImageMode
 from generator.dataset.format.heads_table import HeadRow, write_heads
 from generator.dataset.format.manifest import (
     Manifest,
     configuration_digest,
     write_manifest,
 )
-from generator.dataset.format.part import UnitRows, commit_unit
-from generator.dataset.format.schema import ImageMode, part_schema
+from generator.dataset.format.part import commit_unit
+from generator.dataset.format.schema import part_schema
+from generator.dataset.format.unit_rows import UnitRows
 from generator.dataset.show.card import write_card
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import rotation_from_angles
@@ -144,7 +146,16 @@ def build_dataset(
     camera: Camera = CAMERA,
 ) -> Manifest:
     """A finished dataset of heads x plan, a part for every chunk of poses."""
-    configuration = {"poses": plan.kind, "images": images}
+    configuration = {
+        "poses": {"kind": plan.kind},
+        "render": {
+            "resolution": camera.width,
+            "lens_mm": camera.lens_mm,
+            "distance_mm": camera.distance_mm,
+            "projection": camera.projection,
+        },
+        "dataset": {"images": images},
+    }
     schema = part_schema(images, VERSIONS, configuration_digest(common_values(configuration)))
     root.mkdir(parents=True)
     parts = []
@@ -152,7 +163,12 @@ def build_dataset(
         for start in range(0, len(plan), chunk):
             unit = unit_rows(head, plan, slice(start, start + chunk), camera)
             parts.append(commit_unit(unit, schema, root, f"{head.subject}-{start}"))
-    heads = tuple(replace(h, lens_mm=camera.lens_mm, distance_mm=camera.distance_mm) for h in heads)
+    seen_by = {
+        "lens_mm": camera.lens_mm,
+        "distance_mm": camera.distance_mm,
+        "projection": camera.projection,
+    }
+    heads = tuple(replace(head, **seen_by) for head in heads)
     write_heads(heads, root)
     triangles, weights = np.arange(468), np.full((468, 3), 1 / 3)
     triangles[-1] = -1

@@ -3,22 +3,34 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
-from generator.dataset.format.missing import exact_in_pixels, fill_missing, rotated_frontal
+from generator.dataset.format.missing import (
+    CHOICES,
+    MISSING,
+    Missing,
+    exact_in_pixels,
+    fill_missing,
+    rotated_frontal,
+)
 from generator.dataset.format.open import as_array
-from generator.dataset.format.part import UnitRows, unit_table
 from generator.dataset.format.schema import part_schema
+from generator.dataset.format.unit_rows import UnitRows, unit_table
 from generator.errors import UsageError
 from generator.geometry.rigid import fit_similarity
 from generator.geometry.rotation import geodesic_deg
+from generator.registries import FORMATS
 
 SCHEMA = part_schema("none", {"headturn": "0"}, "")
 
 
-def test_masked_keeps_what_is_missing_missing(rows: UnitRows) -> None:
-    landmarks, origin = fill_missing(unit_table(rows, SCHEMA), "masked")
+@pytest.mark.parametrize("choice", ["keep", "masked"])
+def test_keep_leaves_what_is_missing_missing(rows: UnitRows, choice: str) -> None:
+    """masked is what keep was called before."""
+    landmarks, origin = fill_missing(unit_table(rows, SCHEMA), choice)
     assert (origin == np.where(rows.detected, "detected", "missing")).all()
     assert np.isnan(landmarks[~rows.detected]).all()
 
@@ -66,5 +78,13 @@ def test_nothing_to_fill_with_is_said(rows: UnitRows) -> None:
         landmarks, origin = fill_missing(table, choice)
         assert set(origin) == {"missing"}
         assert np.isnan(landmarks).all()
-    with pytest.raises(UsageError, match="zeros"):
+    with pytest.raises(UsageError, match=r"'zeros' is none of keep, exact, frontal"):
         fill_missing(table, "zeros")
+
+
+def test_there_is_one_name_for_each_thing_to_do() -> None:
+    names = get_args(Missing)
+    assert names == tuple(MISSING) == ("fail", "keep", "skip", "exact", "frontal")
+    assert set(CHOICES) <= set(names)
+    for name in FORMATS:
+        assert set(FORMATS.get(name).missing) <= set(names)

@@ -15,8 +15,9 @@ import pytest
 
 from generator.dataset.format.digest import add_digests, content_digest
 from generator.dataset.format.open import as_array
-from generator.dataset.format.part import check_part, commit_unit, read_part, unit_table, write_part
+from generator.dataset.format.part import check_part, commit_unit, read_part, write_part
 from generator.dataset.format.schema import part_schema
+from generator.dataset.format.unit_rows import unit_table
 from generator.errors import DatasetError
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 

@@ -16,6 +16,8 @@ from PIL import Image
 
 from generator.geometry.rotation import rotation_from_angles
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("yaw_deg", "pitch_deg", "roll_deg")
 
 

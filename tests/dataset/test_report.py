@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import json
 import re
 import shutil
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,45 +14,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import small_dataset
-from scipy.spatial.transform import Rotation
+from known_error import REGIONS, SHIFT
 from small_dataset import CAMERA, HEADS, face_points
 
 from generator import cli
 from generator.dataset.show.report.page import page_text, report_data, write_report
-from generator.dataset.show.report.regions import REGIONS
 from generator.errors import DatasetError
 from generator.plan.poses import PosePlan, grid_plan
-
-PLAN = grid_plan((-30, 30, 15), (-20, 20, 20), (-10, 10, 10))
-SHIFT = {"eyes": (2.0, -1.0), "mouth": (0.0, 3.0)}
-"""Known errors, pixels right and down, added to what the detector says of s1; s2 gets twice as much."""
 
 
 def data_of(root: Path) -> dict:
     return report_data(root, lambda _: None)
-
-
-@pytest.fixture(scope="module")
-def known(tmp_path_factory, build) -> Path:
-    """A dataset whose detector is off by SHIFT, and otherwise exact."""
-    root = tmp_path_factory.mktemp("report") / "dataset"
-    original = small_dataset.unit_rows
-
-    def shifted(head, plan, chosen, camera=CAMERA):
-        rows = original(head, plan, chosen, camera)
-        landmarks = rows.landmarks.copy()
-        for name, (dx, dy) in SHIFT.items():
-            landmarks[:, REGIONS[name], :2] += np.array([dx, dy]) * (1 if head.subject == "s1" else 2)
-        # One more miss, so that yaw and pitch cannot be taken for each other.
-        missed = (rows.angles_deg == (-15, 0, 10)).all(axis=1)
-        landmarks[missed] = np.nan
-        return replace(rows, landmarks=landmarks, detected=rows.detected & ~missed)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(small_dataset, "unit_rows", shifted)
-        hidden = replace(HEADS[1], redistributable=False, license="</script><b>FaceScape & co")
-        build(root, heads=(HEADS[0], hidden), plan=PLAN)
-    return root
 
 
 def cell(data: dict, yaw: float, pitch: float, roll: float) -> int:
@@ -181,11 +150,13 @@ def test_the_page_carries_everything_and_nothing_of_the_network(known, tmp_path)
 
 
 def test_many_heads_keep_the_page_small(known):
+    from generator.dataset.format.dataset_poses import DatasetPoses
     from generator.dataset.show.report.atlas import NUMBERS, Atlas
     from generator.dataset.show.report.cells import PoseCells
+    from generator.plan.pose_plans import PosePlans
 
     heads = [replace(HEADS[0], subject=f"p{k}") for k in range(2000)]
-    atlas = Atlas(heads, PoseCells.of(grid_plan((-50, 50, 10), (-40, 40, 10), (-30, 30, 10))))
+    atlas = Atlas(heads, PoseCells.of(DatasetPoses(heads, PosePlans(grid_plan()))))
     assert 10 < len(atlas.heads) < 50
     numbers = re.findall(r"\d+|null", json.dumps(atlas.as_dict()["maps"]))
     assert len(numbers) < 1.1 * NUMBERS
@@ -206,136 +177,3 @@ def test_the_command(known, tmp_path, monkeypatch, capsys):
         cli.main()
     assert not stopped.value.code
     assert json.loads(capsys.readouterr().out) == {"page": str(page), "bytes": page.stat().st_size}
-
-
-# ---- in a browser ------------------------------------------------------------------------------
-
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--enable-logging=stderr", "--virtual-time-budget=5000",
-)  # fmt: skip
-
-# Moves the controls as a person would and leaves what is then on the page in its title.
-PROBE = """<script>
-addEventListener("load", () => {
-  const $ = (id) => document.getElementById(id);
-  const set = (id, value, event) => { $(id).value = value; $(id).dispatchEvent(new Event(event)); };
-  const cells = (id) => Object.fromEntries([...$(id).querySelectorAll("td")].map((td) =>
-    [td.dataset.at, td.dataset.value === undefined ? null : Number(td.dataset.value)]));
-  const seen = { ready: document.documentElement.dataset.ready };
-  seen.all = cells("detection"); seen.distance = cells("atlas");
-  set("roll", 2, "input"); seen.detection_roll = cells("detection"); seen.roll = $("roll-value").textContent;
-  set("pick", 1, "change"); set("region", 1, "change"); set("measure", "dx", "change");
-  seen.eyes_dx = cells("atlas");
-  set("measure", "spread", "change"); set("roll", 0, "input"); set("pick", 0, "change");
-  seen.eyes_spread = cells("atlas");
-  seen.regions = [...$("regions").querySelectorAll("td[data-value]")].map((td) => td.dataset.value);
-  const td = $("detection").querySelector('[data-at="4,2"]');
-  td.dispatchEvent(new Event("mouseenter")); seen.hover = $("detection-readout").textContent;
-  td.focus();
-  td.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
-  seen.focus = document.activeElement.dataset.at;
-  seen.badges = [...document.querySelectorAll(".badge")].map((b) => b.textContent);
-  seen.tiles = document.querySelectorAll(".tile img").length;
-  seen.licence = document.querySelectorAll(".head p")[7].textContent;
-  seen.wide = document.documentElement.scrollWidth; seen.window = innerWidth;
-  const out = document.createElement("pre"); out.id = "probe";
-  out.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(seen)))); document.body.append(out);
-});
-</script>"""
-
-
-@pytest.fixture(scope="module")
-def chromium() -> str:
-    """A browser, if there is one."""
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if found is None:
-        pytest.skip("no Chromium on this machine; `sh scripts/test_browser.sh` installs Debian's")
-    return found
-
-
-def browse(chromium: str, page: Path, tmp_path: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Open a page in a browser that knows nothing; stderr holds its console."""
-    command = [chromium, *FLAGS, f"--user-data-dir={tmp_path / 'profile'}", *options, page.as_uri()]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-
-
-# A window cannot be as narrow as a telephone, a frame can.
-FRAME = """<!DOCTYPE html>
-<iframe id="frame" style="border: 0" width="{width}" height="900" srcdoc="{page}"></iframe>
-<pre id="seen"></pre><script>addEventListener("load", () => {{ document.getElementById("seen").textContent =
-  document.getElementById("frame").contentDocument.getElementById("probe").textContent; }});</script>"""
-
-
-@pytest.mark.parametrize("width", [1400, 390])
-def test_what_a_browser_shows_is_what_the_table_says(known, chromium, tmp_path, width):
-    page = tmp_path / "r.html"
-    write_report(known, page)
-    text = page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>")
-    page.write_text(FRAME.format(width=width, page=html.escape(text)), encoding="utf-8")
-    shown = browse(chromium, page, tmp_path, "--window-size=1500,1000", "--dump-dom")
-    assert "CONSOLE" not in shown.stderr, shown.stderr
-    probe = re.search(r'<pre id="seen">([^<]+)</pre>', shown.stdout)
-    assert probe, shown.stderr
-    seen = json.loads(base64.b64decode(probe.group(1)))
-    assert seen["ready"] == "yes"
-    assert seen["wide"] <= seen["window"] == width  # nothing sticks out
-
-    table = pq.read_table(known / "data").to_pylist()
-    yaws, pitches = (-30, -15, 0, 15, 30), (-20, 0, 20)
-
-    def rows(at: str, **wanted) -> list[dict]:
-        i, j = map(int, at.split(","))
-        place = {"yaw_deg": yaws[i], "pitch_deg": pitches[j], **wanted}
-        return [row for row in table if all(row[name] == value for name, value in place.items())]
-
-    def rate(found: list[dict]) -> float:
-        return sum(row["detected"] for row in found) / len(found)
-
-    assert len(seen["all"]) == 15
-    assert seen["all"] == {at: rate(rows(at)) for at in seen["all"]}
-    assert seen["roll"] == "0°"
-    assert seen["detection_roll"] == {at: rate(rows(at, roll_deg=0)) for at in seen["all"]}
-    for at, value in seen["distance"].items():
-        expected = [distance(row) for row in rows(at) if row["detected"]]
-        assert value == (pytest.approx(np.mean(expected), abs=2e-3) if expected else None)
-    missed = {at for at in seen["all"] if seen["all"][at] == 0}
-    assert missed == {"4,2"}
-    dx, dy = SHIFT["eyes"]
-    for at, value in seen["eyes_dx"].items():
-        assert value == (None if at in missed else pytest.approx(dx, abs=1e-3))
-    for at, value in seen["eyes_spread"].items():
-        assert value == (None if at in missed else pytest.approx(np.hypot(dx, dy) / 2, abs=2e-3))
-    whole = [distance(row) for row in table if row["detected"]]
-    assert float(seen["regions"][0]) == pytest.approx(np.mean(whole), abs=2e-3)
-    assert "0 of 6 faces found" in seen["hover"] and "Yaw +30°, pitch +20°" in seen["hover"]
-    assert seen["focus"] == "3,2"
-    assert seen["badges"] == ["✓ may be published", "✕ not for publication"]
-    assert seen["licence"] == "</script><b>FaceScape & co"
-    assert seen["tiles"] == 2 * 9
-
-
-def distance(row: dict) -> float:
-    """Mean distance of the detected landmarks from the exact ones, pixels, from the labels alone."""
-    r = Rotation.from_euler("XYZ", [-row["pitch_deg"], row["yaw_deg"], row["roll_deg"]], degrees=True)
-    mm = r.apply(face_points()) + row["translation_mm"]
-    exact = CAMERA.project(mm)[:-1]  # the last point has no anchor
-    found = np.array(row["landmarks"]).reshape(468, 3)[:-1, :2]
-    return float(np.linalg.norm(found - exact, axis=1).mean())
-
-
-@pytest.mark.parametrize("without", ["exact landmarks", "images"])
-def test_a_page_with_less_on_it_has_no_errors_either(tmp_path, build, monkeypatch, chromium, without):
-    heads = HEADS
-    if without == "exact landmarks":
-        monkeypatch.setattr(small_dataset, "face_anchors", lambda: np.full((468, 3), np.nan))
-        heads = tuple(replace(head, anchor_absent=468) for head in HEADS)
-    build(tmp_path / "d", "none" if without == "images" else "files", heads=heads)
-    write_report(tmp_path / "d", tmp_path / "r.html")
-    shown = browse(chromium, tmp_path / "r.html", tmp_path, "--dump-dom")
-    assert "CONSOLE" not in shown.stderr, shown.stderr
-    assert 'data-ready="yes"' in shown.stdout
-    assert (
-        "No head of this dataset has exact landmarks" in re.sub("<script.*</script>", "", shown.stdout)
-    ) == (without == "exact landmarks")

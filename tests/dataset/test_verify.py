@@ -21,6 +21,7 @@ from generator.dataset.format.manifest import read_manifest, write_manifest
 from generator.dataset.format.part import check_part, read_part
 from generator.dataset.proof.verify import VerifyReport, verify_dataset
 from generator.errors import DatasetError
+from generator.geometry.camera import Camera
 from generator.plan.poses import sobol_plan
 
 PART = "data/train/part-s1-0.parquet"
@@ -179,12 +180,12 @@ def test_a_tampered_label(dataset):
         ("yaw_index", 1, "identity", "place in the grid differs"),
         ("rotation", [1.0, 0, 0, 0, 1, 0, 0, 0, 1], "rotation", "rotation does not agree"),
         ("quaternion", [1.0, 0, 0, 0], "rotation", "quaternion does not agree"),
-        ("camera", [1.0] * 9, "camera", "camera differs from heads.parquet"),
-        ("translation_mm", [0.0, 0, 701], "camera", "translation_mm differs"),
-        ("height", 65, "camera", "square image"),
+        ("camera", [1.0] * 9, "camera", "camera is not what the configuration plans"),
+        ("translation_mm", [0.0, 0, 701], "camera", "translation_mm is not what"),
+        ("height", 65, "camera", "not that of the camera's image"),
         ("detected", False, "landmarks", "not detected, but a landmark is not NaN"),
         ("landmarks", [float("nan")] + [0.0] * 1403, "landmarks", "detected, but a landmark is not finite"),
-        ("projection", "orthographic", "camera", "projection differs"),
+        ("projection", "orthographic", "camera", "projection is not what"),
         ("landmarks_exact", [700.0] * 1404, "exact landmarks", r"not R_C X \+ t"),
         ("landmarks_visible", [True] * 468, "exact landmarks", "without an anchor is visible"),
         ("image_sha256", "0" * 64, "images", "SHA-256 differs"),
@@ -268,7 +269,7 @@ def test_another_schema(dataset):
     [
         ("manifest.json", "manifest", "not a Headturn dataset, or its build did not finish"),
         ("heads.parquet", "heads and poses", "heads.parquet: cannot be read"),
-        ("poses.csv", "heads and poses", "poses.csv: cannot be read"),
+        ("poses.csv", "heads and poses", "poses.csv: not the poses of an earlier build"),
     ],
 )
 def test_a_missing_side_file(dataset, file, check, message):
@@ -341,6 +342,14 @@ def test_the_rigid_fit_must_close(dataset):
     exact[0][2] += 1e-3
     rewrite(dataset, {"landmarks_exact": exact}, honest=True)
     assert "y-30_p-20_r+0: landmarks_exact is not" in failures(verify_dataset(dataset))["exact landmarks"]
+
+
+def test_what_is_outside_of_the_image_cannot_be_visible(build, tmp_path):
+    """The fixture's visibility only asks which side of the face looks to the camera."""
+    build(tmp_path / "d", camera=Camera.square(64, 300.0, 700.0))
+    problems = failures(verify_dataset(tmp_path / "d"))
+    assert set(problems) == {"exact landmarks"}
+    assert "y-30_p-20_r+0: a landmark outside the image is visible" in problems["exact landmarks"]
 
 
 def test_no_anchors_table(dataset):

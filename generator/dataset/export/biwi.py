@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.dataset.export.numbered import head_numbers, write_identities
+from generator.dataset.export.options import Format
 from generator.dataset.export.sample import Sample
 from generator.dataset.export.source import Source, require_images
 
@@ -54,3 +55,12 @@ def _calibration(sample: Sample) -> str:
     """Intrinsics, distortion, rotation and translation to the depth camera, size: the layout of rgb.cal."""
     blocks = [_lines(sample.camera), "0 0 0 0", _lines(np.eye(3)), "0 0 0", f"{sample.width} {sample.height}"]
     return "\n\n".join(blocks) + "\n"
+
+
+FORMAT = Format(
+    write,
+    readers="readers of the Biwi Kinect database",
+    holds="`frame_XXXXX_pose.txt`, `_rgb.png`, `rgb.cal`",
+    written="the matrix in the file is R_C",
+    back="as it stands",
+)

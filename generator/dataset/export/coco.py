@@ -10,9 +10,10 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from generator.dataset.export.ibug68 import NAMES, skeleton
+from generator.dataset.export.options import NEEDS_POINTS, Format
 from generator.dataset.export.sample import Sample
 from generator.dataset.export.source import Source, require_images
+from generator.landmarks.topology import PointSubset
 
 VISIBLE, HIDDEN = 2, 1
 
@@ -46,7 +47,7 @@ def write(source: Source, folder: Path) -> str:
             if sample.split not in files:
                 opened = (folder / "annotations" / f"{sample.split}.json").open("w", encoding="utf-8")
                 files[sample.split] = stack.enter_context(opened)
-                opened.write(_opening())
+                opened.write(_opening(source.points))
                 images[sample.split] = []
             listed = images[sample.split]
             # Streamed: a list of a million annotations would not fit into memory.
@@ -87,15 +88,26 @@ def annotation(sample: Sample, number: int) -> dict[str, Any]:
     }
 
 
-def _opening() -> str:
+def _opening(points: PointSubset) -> str:
     category = {
         "id": 1,
         "name": "face",
         "supercategory": "person",
-        "keypoints": NAMES,
-        "skeleton": [(a + 1, b + 1) for a, b in skeleton()],  # COCO counts them from 1
+        "keypoints": points.names,
+        "skeleton": [(a + 1, b + 1) for a, b in points.skeleton],  # COCO counts them from 1
     }
     info = {"description": "Head poses with exact labels, made with Headturn; see README.md"}
     licences = [{"id": 1, "name": "of each head, see README.md", "url": ""}]
     head = {"info": info, "licenses": licences, "categories": [category]}
     return json.dumps(head)[:-1] + ',\n"annotations": ['
+
+
+FORMAT = Format(
+    write,
+    readers="keypoint toolkits",
+    holds="68 keypoints with visibility, a JSON a split",
+    written="`rotation`, nine numbers",
+    back="as it stands",
+    missing=NEEDS_POINTS,
+    landmarks=True,
+)

@@ -10,10 +10,11 @@ from typing import Any
 import pyarrow as pa
 
 from generator.dataset.export.huggingface import card
+from generator.dataset.export.options import Format
 from generator.dataset.export.source import Source
-from generator.dataset.export.tables import exported_schema, write_tables
-from generator.dataset.format.schema import IMAGE_FIELD
-from generator.dataset.show.card import CARD_FILE, COLUMNS
+from generator.dataset.export.tables import IMAGE, exported_schema, write_tables
+from generator.dataset.format.columns import ROWS as COLUMNS
+from generator.dataset.show.card import CARD_FILE
 
 CROISSANT_FILE = "croissant.json"
 FILES, ROWS = "parts", "rows"
@@ -79,7 +80,7 @@ def description(source: Source) -> dict[str, Any]:
     """The content of croissant.json."""
     licences = sorted({head.license for head in source.heads})
     schema = exported_schema(source)
-    meanings = {name.strip(): text for names, text in COLUMNS for name in names.split(",")}
+    meanings = {name: column.meaning for name, column in COLUMNS.items()}
     attributions = dict.fromkeys(" ".join(h.attribution.split()) for h in source.heads if h.attribution)
     publishable = sum(head.redistributable for head in source.heads)
     return {
@@ -122,7 +123,7 @@ def description(source: Source) -> dict[str, Any]:
 
 def _field(field: pa.Field, meaning: str) -> dict[str, Any]:
     listed = pa.types.is_fixed_size_list(field.type)
-    image = field.name == IMAGE_FIELD.name
+    image = field.name == IMAGE
     kind = field.type.value_type if listed else field.type
     described: dict[str, Any] = {
         "@type": "cr:Field",
@@ -145,3 +146,13 @@ def _data_type(kind: pa.DataType) -> str:
     if pa.types.is_integer(kind):
         return "sc:Integer"
     return "sc:Float" if pa.types.is_floating(kind) else "sc:Text"
+
+
+FORMAT = Format(
+    write,
+    readers="machine-readable catalogues",
+    holds="the same and `croissant.json` (Croissant 1.0)",
+    written="`rotation`, nine numbers",
+    back="as it stands",
+    public=True,
+)

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from generator.dataset.export.options import Format
 from generator.dataset.export.readme import conventions, facts, licences
 from generator.dataset.export.source import Source
-from generator.dataset.export.tables import dtype_name, exported_schema, write_tables
+from generator.dataset.export.tables import IMAGE, dtype_name, exported_schema, write_tables
+from generator.dataset.format.columns import ROWS
 from generator.dataset.format.heads_table import HEADS_FILE
-from generator.dataset.format.schema import IMAGE_FIELD
-from generator.dataset.show.card import CARD_FILE, COLUMNS, markdown_table
+from generator.dataset.show.card import CARD_FILE
+from generator.dataset.show.column_tables import column_rows, markdown_table
 
 _HUB_LICENCES = {
     "CC0-1.0": "cc0-1.0",
@@ -33,7 +35,7 @@ rows = load_dataset("FOLDER OR NAME ON THE HUB")
 heads = load_dataset("FOLDER OR NAME ON THE HUB", "heads")
 ```
 
-Landmarks as an array: `np.array(row["landmarks"]).reshape(468, 3)`. Not with `with_format("numpy")`, which
+Landmarks as an array: `np.array(row["landmarks"]).reshape(-1, 3)`. Not with `with_format("numpy")`, which
 narrows float64 to float32."""
 
 
@@ -47,9 +49,7 @@ def write(source: Source, folder: Path) -> str:
 def card(source: Source, rows: Mapping[str, int], name: str) -> str:
     """README.md with the front matter of the hub. rows: of each split."""
     schema = exported_schema(source)
-    columns = [(what, meaning) for what, meaning in COLUMNS if any(c in schema.names for c in _names(what))]
-    if source.has_images:
-        columns.append(("image", "the image, encoded"))
+    columns = column_rows(ROWS.values(), source.topology, lambda column: column.name in schema.names)
     rate = sum(p.detected for p in source.parts) / max(1, sum(p.rows for p in source.parts))
     summary = (
         f"Images of {len(source.heads)} heads with exact head pose: {source.rows} rows, rendered in Blender "
@@ -63,14 +63,10 @@ def card(source: Source, rows: Mapping[str, int], name: str) -> str:
         facts(source, name),
         "## Licences\n\n" + licences(source),
         "## Reading\n\n" + _READING,
-        "## Columns\n\n" + markdown_table(("column", "meaning"), columns),
-        "## Conventions\n\n" + conventions(),
+        "## Columns\n\n" + markdown_table(("column", "type", "meaning"), columns),
+        "## Conventions\n\n" + conventions(source),
     ]
     return "\n\n".join(sections) + "\n"
-
-
-def _names(columns: str) -> list[str]:
-    return [name.strip() for name in columns.split(",")]
 
 
 def _front_matter(source: Source, rows: Mapping[str, int], schema: pa.Schema) -> str:
@@ -100,7 +96,7 @@ def _front_matter(source: Source, rows: Mapping[str, int], schema: pa.Schema) ->
     lines.append("  features:")
     for field in schema:
         lines.append(f"  - name: {field.name}")
-        if field.name == IMAGE_FIELD.name:
+        if field.name == IMAGE:
             lines.append("    dtype: image")
         elif pa.types.is_fixed_size_list(field.type):
             # "sequence" is the older spelling of a list, which old and new versions of datasets read.
@@ -112,3 +108,13 @@ def _front_matter(source: Source, rows: Mapping[str, int], schema: pa.Schema) ->
     for split, count in sorted(rows.items()):
         lines += [f"  - name: {json.dumps(split)}", f"    num_examples: {count}"]
     return "\n".join([*lines, "---"])
+
+
+FORMAT = Format(
+    write,
+    readers="the hub",
+    holds="Parquet with images inside, heads, a card",
+    written="`rotation`, nine numbers",
+    back="as it stands",
+    public=True,
+)

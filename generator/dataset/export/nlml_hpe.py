@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from generator.dataset.export.numbered import head_numbers, write_identities
+from generator.dataset.export.options import Format
 from generator.dataset.export.source import Source, require_images
 from generator.errors import UsageError
 
@@ -40,3 +41,12 @@ def write(source: Source, folder: Path) -> str:
         path.write_bytes(sample.jpeg())
     write_identities(source.heads, numbers, folder)
     return ABOUT
+
+
+FORMAT = Format(
+    write,
+    readers="the published code of NLML-HPE",
+    holds="`<id>/ID<id>_(<yaw>_<pitch>_<roll>).jpg`",
+    written="(yaw, pitch, roll) in the file name, whole degrees",
+    back="Rx(-pitch) Ry(yaw) Rz(roll)",
+)

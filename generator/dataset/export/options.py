@@ -1,18 +1,51 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be chosen about an export."""
+"""What a format is, and what may be chosen about an export."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
+
+from generator.dataset.format.missing import Missing
+
+if TYPE_CHECKING:
+    from generator.dataset.export.source import Source
 
 Landmarks = Literal["auto", "exact", "detected"]
-"""Which 468 points: from the mesh, from the detector, or (auto) the mesh's if the dataset has them."""
+"""Which landmarks: from the mesh, from the detector, or (auto) the mesh's if all heads have them."""
 
-Missing = Literal["keep", "skip", "exact", "fail"]
-"""Rows without what the format needs: kept as they are, left out, filled from the mesh, or refused."""
+LANDMARKS: tuple[Landmarks, ...] = get_args(Landmarks)
 
 OVERRIDE = "--i-may-publish-these-heads"
+
+NEEDS_POINTS: tuple[Missing, ...] = ("fail", "skip", "exact")
+"""Choices of a format that is nothing without landmarks."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One form of an export; each module of this package has one, called FORMAT.
+
+    write: writes the rows of a source into a folder; returns what README.md says about the format, or
+        "" if it wrote one itself.
+    readers, holds: for whom it is, and what is in it, for docs/exports.md; so are written (which
+        rotation stands where) and back (how that gives R_C again).
+    missing: the choices for rows without what the format needs; the first is the default.
+    landmarks: does it hold any? They are the 68 points of iBUG. images: does it take images?
+    public: is it meant for publication?
+    """
+
+    write: Callable[[Source, Path], str]
+    readers: str
+    holds: str
+    written: str
+    back: str
+    missing: tuple[Missing, ...] = ("keep", "skip", "fail")
+    landmarks: bool = False
+    images: bool = True
+    public: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from generator.dataset.export.options import OVERRIDE
 from generator.dataset.export.source import Source
-from generator.dataset.format.schema import CONVENTIONS
-from generator.dataset.show.card import licences_text, markdown_table
+from generator.dataset.format.missing import Missing
+from generator.dataset.format.schema import conventions as conventions_of
+from generator.dataset.show.card import licences_text
+from generator.dataset.show.column_tables import markdown_table
 
-_MISSING = {
+_MISSING: dict[Missing, str] = {
     "keep": "kept: their labels are exact all the same",
     "skip": "left out",
     "exact": "filled with the exact landmarks, each marked as such",
@@ -48,9 +50,9 @@ def licences(source: Source) -> str:
     return text
 
 
-def conventions() -> str:
+def conventions(source: Source) -> str:
     """The conventions of the dataset, as Markdown."""
-    return markdown_table(("what", "definition"), tuple(CONVENTIONS.items()))
+    return markdown_table(("what", "definition"), tuple(conventions_of(source.topology).items()))
 
 
 def readme(source: Source, name: str, about: str) -> str:
@@ -60,6 +62,6 @@ def readme(source: Source, name: str, about: str) -> str:
         facts(source, name),
         "## Format\n\n" + about.rstrip(),
         "## Licences\n\n" + licences(source),
-        "## Conventions of the dataset\n\n" + conventions(),
+        "## Conventions of the dataset\n\n" + conventions(source),
     ]
     return "\n\n".join(sections) + "\n"

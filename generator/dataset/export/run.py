@@ -7,48 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from generator.dataset.export import biwi, coco, croissant, huggingface, nlml_hpe, sixdrepnet, w300_lp
 from generator.dataset.export.licence import check_licences
-from generator.dataset.export.options import ExportOptions, Missing
+from generator.dataset.export.options import LANDMARKS, ExportOptions, Format
 from generator.dataset.export.readme import readme
 from generator.dataset.export.source import Source
 from generator.dataset.export.target import new_folder
 from generator.dataset.format.heads_table import HeadRow, read_heads
 from generator.dataset.format.manifest import read_manifest
-from generator.dataset.format.schema import LANDMARKS
+from generator.dataset.format.open import dataset_topology
 from generator.dataset.show.card import CARD_FILE
 from generator.errors import UsageError
-
-Exporter = Callable[[Source, Path], str]
-"""Writes the rows of a source into a folder; returns what README.md says about the format, or "" if
-it wrote one itself."""
-
-
-@dataclass(frozen=True)
-class Format:
-    """missing: the choices for rows without what the format needs; the first is the default.
-
-    landmarks: does it hold any? public: is it meant for publication?
-    """
-
-    write: Exporter
-    missing: tuple[Missing, ...] = ("keep", "skip", "fail")
-    landmarks: bool = False
-    images: bool = True
-    public: bool = False
-
-
-_NEEDS_POINTS: tuple[Missing, ...] = ("fail", "skip", "exact")
-
-FORMATS = {
-    "nlml-hpe": Format(nlml_hpe.write),
-    "300w-lp": Format(w300_lp.write, _NEEDS_POINTS, landmarks=True),
-    "6drepnet": Format(sixdrepnet.write),
-    "biwi": Format(biwi.write),
-    "huggingface": Format(huggingface.write, public=True),
-    "croissant": Format(croissant.write, public=True),
-    "coco": Format(coco.write, _NEEDS_POINTS, landmarks=True),
-}
+from generator.landmarks.topology import Topology
+from generator.registries import FORMATS
 
 
 @dataclass(frozen=True)
@@ -77,7 +47,8 @@ def export_dataset(
 ) -> Exported:
     """Write a finished dataset in another form.
 
-    name: one of FORMATS. target: a folder that is new or empty; it is there in full or not at all.
+    name: one of :data:`generator.registries.FORMATS`.
+    target: a folder that is new or empty; it is there in full or not at all.
     progress: called with the number of rows that were read.
 
     Raises
@@ -88,21 +59,28 @@ def export_dataset(
         no images and the format needs them; the target cannot be written.
     """
     root, target, options = Path(root), Path(target), options or ExportOptions()
-    if name not in FORMATS:
-        raise UsageError(f"--format {name!r}: expected one of {', '.join(FORMATS)}")
-    chosen = FORMATS[name]
+    chosen: Format = FORMATS.get(name)
+    if options.landmarks not in LANDMARKS:
+        raise UsageError(f"--landmarks {options.landmarks!r}: expected one of {', '.join(LANDMARKS)}")
     manifest = read_manifest(root)
     missing = options.missing or chosen.missing[0]
     if missing not in chosen.missing:
         raise UsageError(f"--missing {missing}: {name} takes one of {', '.join(chosen.missing)}")
     public = options.public or chosen.public
     heads, kept_back = check_licences(root, manifest, read_heads(root), options, public)
+    topology = dataset_topology(root, manifest)
+    if chosen.landmarks and topology.ibug_68 is None:
+        raise UsageError(
+            f"{root}: {name} holds the 68 points of iBUG, which the landmarks {topology.name} do not say; "
+            "choose another --format"
+        )
     source = Source(
         root=root,
         manifest=manifest,
+        topology=topology,
         heads=heads,
         options=options,
-        landmarks=_landmarks(root, heads, options.landmarks) if chosen.landmarks else "",
+        landmarks=_landmarks(root, heads, options.landmarks, topology) if chosen.landmarks else "",
         missing=missing,
         wants_images=chosen.images,
         progress=progress or (lambda _: None),
@@ -119,9 +97,9 @@ def export_dataset(
     )
 
 
-def _landmarks(root: Path, heads: list[HeadRow], choice: str) -> str:
+def _landmarks(root: Path, heads: list[HeadRow], choice: str, topology: Topology) -> str:
     """Where the landmarks come from: one answer for the whole export."""
-    without = [f"{head.subject}/{head.expression}" for head in heads if head.anchor_absent == LANDMARKS]
+    without = [f"{head.subject}/{head.expression}" for head in heads if head.anchor_absent == topology.count]
     if choice == "exact" and len(without) == len(heads):
         raise UsageError(
             f"{root}: no head has exact landmarks (first: {without[0]}); take --landmarks detected"

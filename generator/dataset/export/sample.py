@@ -83,20 +83,3 @@ class Sample:
 def suffix_of(name: str, encoded: bytes) -> str:
     """The suffix of an image's name, or of its first bytes where it has no name."""
     return Path(name).suffix.lower() or (".jpg" if encoded[:2] == b"\xff\xd8" else ".png")
-
-
-def exact_pixels(
-    points_mm: np.ndarray, camera: np.ndarray, translation_mm: np.ndarray, projection: str
-) -> np.ndarray:
-    """Isotropic pixels of points in frame C: x and y as the camera sees them, z the depth
-    behind the pivot at the scale of the pivot.
-
-    points_mm: float [N, L, 3]. camera: float [N, 3, 3]. translation_mm: float [N, 3].
-    Returns float64 [N, L, 3].
-    """
-    points = np.asarray(points_mm, dtype=np.float64)
-    focal, centre = camera[:, None, :1, 0], camera[:, None, :2, 2]
-    distance = translation_mm[:, None, 2:]
-    depth = points[..., 2:] if projection == "perspective" else distance
-    image = points[..., :2] / depth * focal + centre
-    return np.concatenate([image, (points[..., 2:] - distance) * focal / distance], axis=-1)

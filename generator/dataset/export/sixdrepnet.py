@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from generator.dataset.export.options import Format
 from generator.dataset.export.source import Source
 from generator.geometry.rotation import graphics_rotation
 
@@ -60,3 +61,12 @@ def write(source: Source, folder: Path) -> str:
 def get_r(rotation: np.ndarray) -> np.ndarray:
     """6DRepNet's get_R of R_C. [..., 3, 3] -> [..., 3, 3]."""
     return np.swapaxes(graphics_rotation(rotation), -1, -2)
+
+
+FORMAT = Format(
+    write,
+    readers="6D rotation losses",
+    holds="`labels.npz` and text: get_R, its first two columns",
+    written="`R` = Rz(roll) Ry(yaw) Rx(pitch)",
+    back="D Rᵀ D",
+)

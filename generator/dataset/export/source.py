@@ -11,28 +11,32 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from generator.dataset.export.ibug68 import IBUG_68
-from generator.dataset.export.options import ExportOptions, Missing
-from generator.dataset.export.sample import Sample, exact_pixels, suffix_of
+from generator.dataset.export.options import ExportOptions
+from generator.dataset.export.sample import Sample, suffix_of
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.missing import Missing
 from generator.dataset.format.open import as_array, image_bytes, read_rows
 from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.row_cameras import COLUMNS as CAMERA
+from generator.dataset.format.row_cameras import RowCameras
 from generator.errors import DatasetError, UsageError
+from generator.landmarks.topology import PointSubset, Topology
 from generator.plan.poses import ANGLES
 
-_TEXT = ("sample_id", "subject", "expression", "split", "projection")
-_NUMBERS = ("rotation", "camera", "translation_mm", "width", "height", "detected")
+_TEXT = ("sample_id", "subject", "expression", "split")
+_NUMBERS = ("rotation", "detected")
 _POINTS = ("landmarks", "landmarks_exact", "landmarks_visible")
 
 
 @dataclass
 class Source:
-    """What an exporter reads. Landmarks are the 68 of :data:`IBUG_68`, which is what the formats hold.
+    """What an exporter reads. Landmarks are iBUG's 68, which is what the formats hold.
 
     Made by :func:`generator.dataset.export.run.export_dataset`.
 
-    heads: those that are exported. landmarks: "exact", "detected", or "" for formats without any.
+    topology: what the dataset's landmarks are. heads: those that are exported.
+    landmarks: "exact", "detected", or "" for formats without any.
     missing: one of the format's choices. wants_images: the format takes images.
     progress: called with the number of rows read.
     rows, left_out: counted while the rows are read.
@@ -40,6 +44,7 @@ class Source:
 
     root: Path
     manifest: Manifest
+    topology: Topology
     heads: list[HeadRow]
     options: ExportOptions
     landmarks: str
@@ -57,6 +62,12 @@ class Source:
             (p for p in self.manifest.parts if not p.subject or (p.subject, p.expression) in chosen),
             key=lambda part: part.path,
         )
+
+    @property
+    def points(self) -> PointSubset:
+        """The points that formats with landmarks hold. Only asked where the topology has such a choice."""
+        assert self.topology.ibug_68 is not None
+        return self.topology.ibug_68
 
     @property
     def has_images(self) -> bool:
@@ -103,7 +114,7 @@ class Source:
         DatasetError: a part or an image is missing or damaged.
         UsageError: a row lacks its landmarks and missing = "fail".
         """
-        columns = [*_TEXT, *_NUMBERS, *(f"{angle}_deg" for angle in ANGLES)]
+        columns = [*_TEXT, *_NUMBERS, *CAMERA, *(f"{angle}_deg" for angle in ANGLES)]
         columns += _POINTS if self.landmarks else ()
         if self.has_images:
             columns += ["image_path", *(["image"] if self.manifest.images == "embedded" else [])]
@@ -114,9 +125,9 @@ class Source:
         text = {name: batch.column(name).to_pylist() for name in _TEXT}
         values = {name: as_array(batch, name) for name in _NUMBERS}
         angles = np.stack([as_array(batch, f"{angle}_deg") for angle in ANGLES], axis=-1)
-        camera = values["camera"].reshape(-1, 3, 3)
+        cameras = RowCameras.of(batch)
         images = batch.select(["image_path"]).to_pylist() if self.has_images else None
-        points, origin, visible = self._points(batch, camera, text["projection"])
+        points, origin, visible = self._points(batch, cameras)
         for k in range(len(batch)):
             if self.landmarks and not self._has_points(text["sample_id"][k], origin[k]):
                 continue
@@ -134,10 +145,10 @@ class Source:
                 split=text["split"][k],
                 angles_deg=angles[k],
                 rotation=values["rotation"][k].reshape(3, 3),
-                camera=camera[k],
-                translation_mm=values["translation_mm"][k],
-                width=int(values["width"][k]),
-                height=int(values["height"][k]),
+                camera=cameras.matrix[k],
+                translation_mm=cameras.translation_mm[k],
+                width=int(cameras.width[k]),
+                height=int(cameras.height[k]),
                 detected=bool(values["detected"][k]),
                 points=points[k] if origin[k] else None,
                 points_from=origin[k],
@@ -147,25 +158,22 @@ class Source:
             )
 
     def _points(
-        self, batch: pa.RecordBatch, camera: np.ndarray, projection: list[str]
+        self, batch: pa.RecordBatch, cameras: RowCameras
     ) -> tuple[np.ndarray, list[str], np.ndarray | None]:
         """Points [N, 68, 3], where each row's come from, and their visibility."""
         if not self.landmarks:
             return np.empty(0), [""] * len(batch), None
-        exact_mm = as_array(batch, "landmarks_exact")[:, IBUG_68]
+        chosen = self.points.indices
+        exact_mm = as_array(batch, "landmarks_exact")[:, chosen]
         has_exact = np.isfinite(exact_mm).all(axis=(1, 2))
-        visible = as_array(batch, "landmarks_visible")[:, IBUG_68] if has_exact.any() else None
-        parallel = np.array(projection) == "orthographic"
-        translation = as_array(batch, "translation_mm")
-        exact = np.empty(exact_mm.shape, np.float64)
-        for rows, name in ((~parallel, "perspective"), (parallel, "orthographic")):
-            exact[rows] = exact_pixels(exact_mm[rows], camera[rows], translation[rows], name)
+        visible = as_array(batch, "landmarks_visible")[:, chosen] if has_exact.any() else None
+        exact = cameras.pixels(exact_mm)
         if self.landmarks == "exact":
             return exact, ["exact" if ok else "" for ok in has_exact], visible
         detected = as_array(batch, "detected").astype(bool)
         fill = ~detected & has_exact if self.missing == "exact" else np.zeros(len(batch), bool)
         points = np.where(
-            fill[:, None, None], exact, as_array(batch, "landmarks")[:, IBUG_68].astype(np.float64)
+            fill[:, None, None], exact, as_array(batch, "landmarks")[:, chosen].astype(np.float64)
         )
         origin = np.where(fill, "exact", np.where(detected, "detected", "")).tolist()
         return points, origin, visible

@@ -13,13 +13,13 @@ import pyarrow as pa
 
 from generator.dataset.export.sample import suffix_of
 from generator.dataset.export.source import Source
-from generator.dataset.format.heads_table import write_heads
+from generator.dataset.format.columns import ROWS
+from generator.dataset.format.defaults import todays_schema
+from generator.dataset.format.heads_table import copy_heads
 from generator.dataset.format.open import image_bytes
 from generator.dataset.format.part import part_schema_of, write_table
-from generator.dataset.format.schema import IMAGE_FIELD
 
-LOCAL_ONLY = ("image_path", "passes_path", "passes_sha256")
-"""Columns that point at files which do not travel with the table."""
+IMAGE = "image"
 
 
 def write_tables(source: Source, folder: Path) -> Counter[str]:
@@ -42,16 +42,17 @@ def write_tables(source: Source, folder: Path) -> Counter[str]:
         with path.open("wb") as file:
             write_table(table, file)
         rows[part.path.split("/")[1]] += len(table)
-    write_heads(source.heads, folder)
+    copy_heads(source.root, [(head.subject, head.expression) for head in source.heads], folder)
     return rows
 
 
 def exported_schema(source: Source) -> pa.Schema:
     """The schema of the parts, with the features of every column in its Hugging Face metadata."""
-    original = part_schema_of(source.root / source.parts[0].path)
-    fields = [field for field in original if field.name not in (*LOCAL_ONLY, IMAGE_FIELD.name)]
+    original = todays_schema(part_schema_of(source.root / source.parts[0].path))
+    stays = {column.name for column in ROWS.values() if column.local} | {IMAGE}
+    fields = [field for field in original if field.name not in stays]
     if source.has_images:
-        fields.append(IMAGE_FIELD)
+        fields.append(ROWS[IMAGE].field(source.topology))
     schema = pa.schema(fields)
     features = {field.name: feature(field) for field in schema}
     metadata = {
@@ -64,7 +65,7 @@ def exported_schema(source: Source) -> pa.Schema:
 
 def feature(field: pa.Field) -> dict[str, Any]:
     """The feature of Hugging Face datasets that a column is."""
-    if field.name == IMAGE_FIELD.name:
+    if field.name == IMAGE:
         return {"_type": "Image"}
     if pa.types.is_fixed_size_list(field.type):
         inner = feature(field.type.value_field)
@@ -85,7 +86,7 @@ def _kept(source: Source, part: Any) -> Iterator[pa.RecordBatch]:
 
 
 def _exported(source: Source, batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
-    columns = [batch.column(field.name) for field in schema if field.name != IMAGE_FIELD.name]
+    columns = [batch.column(field.name) for field in schema if field.name != IMAGE]
     if source.has_images:
         embedded = source.manifest.images == "embedded"
         images = []
@@ -97,5 +98,5 @@ def _exported(source: Source, batch: pa.RecordBatch, schema: pa.Schema) -> pa.Re
             encoded = image_bytes(source.root, row)
             suffix = suffix_of(row["image_path"] or row["image"]["path"], encoded)
             images.append({"bytes": encoded, "path": name.replace("/", "_") + suffix})
-        columns.append(pa.array(images, IMAGE_FIELD.type))
+        columns.append(pa.array(images, schema.field(IMAGE).type))
     return pa.record_batch(columns, schema=schema)

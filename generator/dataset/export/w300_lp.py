@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
+from generator.dataset.export.options import NEEDS_POINTS, Format
 from generator.dataset.export.sample import Sample
 from generator.dataset.export.source import Source, require_images
 
@@ -28,7 +29,7 @@ rows), `files_<split>.txt` those of one split. In a `.mat`:
 R_U = Rx(-pitch) Ry(-yaw) Rz(-roll). tx, ty, tz and scale are 3DDFA's weak perspective taken at the pivot,
 `scale * R_U X + t` with y from the bottom of the image, X in mm and tz = 0 by definition; with a real lens
 it is an approximation, Camera and Translation_mm are exact. The 68 points are a fixed subset of the
-468 of Face Mesh; the jaw's lie on the mesh and not on the visible outline.
+dataset's landmarks; the jaw's lie on the mesh and not on the visible outline.
 """
 
 
@@ -73,3 +74,14 @@ def mat_fields(sample: Sample) -> dict[str, object]:
         "Camera": sample.camera,
         "Translation_mm": sample.translation_mm[None],
     }
+
+
+FORMAT = Format(
+    write,
+    readers="HopeNet, 6DRepNet, FSA-Net, 3DDFA …",
+    holds="`.jpg` + `.mat` (Pose_Para, pt2d, pt3d_68, roi), `files.txt`",
+    written="`Pose_Para[0, :3]` = pitch, yaw, roll, radians",
+    back="D Rx(-pitch) Ry(-yaw) Rz(-roll) D",
+    missing=NEEDS_POINTS,
+    landmarks=True,
+)

@@ -4,28 +4,23 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
-import pyarrow as pa
-
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import write_atomically
+from generator.dataset.format.folders import folder_beside, share_files
 from generator.dataset.format.manifest import Manifest, read_manifest, write_manifest
 from generator.dataset.format.part import (
-    BATCH,
-    ROW_GROUP,
-    PartInfo,
     check_part,
-    iter_part,
+    iter_stored,
     part_schema_of,
     part_writer,
+    row_groups,
 )
+from generator.dataset.format.part_info import PartInfo
 from generator.errors import DatasetError
 
 TARGET_BYTES = 256 * 10**6
@@ -47,7 +42,7 @@ def compact_dataset(
 ) -> Manifest:
     """Write the dataset source again into the new folder target, in parts of about part_bytes.
 
-    Images and tables are linked where both folders are on one disk, else copied.
+    Images are linked where both folders are on one disk, else copied.
     The new folder appears only when it is complete. Returns its manifest.
 
     Raises
@@ -56,32 +51,17 @@ def compact_dataset(
     """
     source, target = source.absolute(), target.absolute()
     manifest = read_manifest(source)
-    if target.exists():
-        raise DatasetError(f"{target} exists; choose another --out")
-    if source in target.parents:
-        raise DatasetError(f"{target} lies inside of {source}; choose another --out")
-    work = target.with_name(f".{target.name}.tmp")
-    shutil.rmtree(work, ignore_errors=True)
-    try:
-        work.mkdir(parents=True)
+    with folder_beside(source, target) as work:
         parts = []
         reporter.stage("compacting", len(manifest.parts))
         for number, group in enumerate(_groups(manifest, part_bytes)):
             parts.append(_merge(source, work, group, number))
             reporter.advance(len(group))
-        for path in sorted(source.iterdir()):
-            if path.name not in _MERGED and not path.name.startswith("."):
-                _link(path, work / path.name)
+        share_files(source, work, _MERGED)
         compacted = replace(manifest, parts=tuple(parts))
         if compacted.digest != manifest.digest:
             raise DatasetError(f"{source}: its parts differ from its manifest; see `headturn verify`")
         write_manifest(compacted, work)
-        work.rename(target)
-    except OSError as error:
-        reason = f"cannot be written ({error.strerror}); free some disk space or check the permissions"
-        raise DatasetError(f"{target}: {reason}") from error
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
     return read_manifest(target)
 
 
@@ -109,7 +89,7 @@ def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> 
     def write(file: BinaryIO) -> None:
         with part_writer(file, schema) as writer:
             for part in group:
-                for rows in _row_groups(iter_part(source / part.path)):
+                for rows in row_groups(iter_stored(source / part.path)):
                     writer.write_table(rows)
 
     def check(temporary: Path) -> PartInfo:
@@ -119,24 +99,3 @@ def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> 
         return replace(info, path=f"data/{split}/{path.name}")
 
     return write_atomically(path, write, check)
-
-
-def _row_groups(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.Table]:
-    """Batches in tables of at most ROW_GROUP rows."""
-    while group := list(islice(batches, ROW_GROUP // BATCH)):
-        yield pa.Table.from_batches(group)
-
-
-def _link(path: Path, target: Path) -> None:
-    """A second name for every file below path, or a copy where the disk has no such thing."""
-    if path.is_dir():
-        shutil.copytree(path, target, copy_function=_link_file)
-    else:
-        _link_file(str(path), str(target))
-
-
-def _link_file(path: str, target: str) -> None:
-    try:
-        os.link(path, target)
-    except OSError:
-        shutil.copy2(path, target)

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Collection, Sequence
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,128 +12,218 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from generator.dataset.format.columns import SCHEMA_VERSION, Column, columns_at, list_of
 from generator.dataset.format.files import one_line, write_atomically
-from generator.dataset.format.schema import LANDMARKS, SCHEMA_VERSION, check_schema_version
+from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
 from generator.errors import DatasetError
 from generator.geometry.camera import Camera, Projection
+from generator.landmarks.topology import FACE_MESH
 
 HEADS_FILE = "heads.parquet"
 IDENTITY = tuple(np.eye(3).reshape(-1).tolist())
+NAN = float("nan")
+
+_TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int32()
+_FILE = pa.struct([pa.field("path", _TEXT, nullable=False), pa.field("sha256", _TEXT, nullable=False)])
 
 
-@dataclass(frozen=True)
-class HeadRow:
-    """One head of the dataset.
+def column(
+    kind: pa.DataType, meaning: str, check: str = "heads and poses", since: str = "1.0.0"
+) -> dict[str, Any]:
+    """What a field of :class:`HeadRow` says about its column besides its name.
 
-    mesh_path: relative to the root of its source, with "/".
-    file_sha256: (path, sha256) of every file that decides the result, paths as mesh_path.
-    mm_per_unit: millimetres in one unit of the mesh. up, forward: its axes, such as "+Y" and "+Z".
-    pivot: centre of the rotation in the mesh's own units and axes.
-    radius_mm: of the sphere about the pivot that holds the face.
-    distance_mm, lens_mm: camera to pivot, and focal length on a 36 mm sensor.
-    projection: "perspective" or "orthographic".
-    frame: where pose zero is, "source" (the mesh's own axes) or "canonical" (levelled).
-    correction: R_U, row-major, that turns the mesh from its own axes (after up and forward) to
-        the canonical pose zero; it was applied only where frame is "canonical".
-    correction_sd_deg: how sure it is, about the axes of yaw, pitch and roll; NaN where no face was found.
-    anchor_views: detections that the anchors are the mean of. anchor_off: points that fell off
-        the silhouette and lie on the nearest surface. anchor_absent: points without an anchor,
-        NaN in landmarks_exact.
-    anchor_residual_px: root mean square distance of the detections from the projected anchors, in
-        pixels of views 384 wide. anchor_residual_mm: median distance on the surface.
-        anchor_asymmetry_mm: rms distance of each anchor from the mirror image of its partner.
-        NaN without anchors.
-    problems: what was wrong but did not stop the head from being built.
+    See :class:`generator.dataset.format.columns.Column`. The field's default is also what a reader
+    takes where an older dataset lacks the column.
     """
+    return {"type": kind, "meaning": meaning, "check": check, "since": since}
 
-    subject: str
-    expression: str
-    source: str
-    mesh_path: str
-    file_sha256: tuple[tuple[str, str], ...]
-    license: str
-    redistributable: bool
-    attribution: str
-    units: str
-    mm_per_unit: float
-    up: str
-    forward: str
-    pivot: tuple[float, float, float]
-    radius_mm: float
-    distance_mm: float
-    lens_mm: float
-    vertices: int
-    triangles: int
-    split: str
-    projection: Projection = "perspective"
-    frame: str = "source"
-    correction: tuple[float, ...] = IDENTITY
-    correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
-    anchor_views: int = 0
-    anchor_off: int = 0
-    anchor_absent: int = LANDMARKS
-    anchor_residual_px: float = float("nan")
-    anchor_residual_mm: float = float("nan")
-    anchor_asymmetry_mm: float = float("nan")
-    problems: tuple[str, ...] = ()
+
+@dataclass(frozen=True, kw_only=True)
+class HeadRow:
+    """One head of the dataset; its fields are the columns of heads.parquet, in their order."""
+
+    subject: str = field(metadata=column(_TEXT, "the person"))
+    expression: str = field(metadata=column(_TEXT, "the expression, such as neutral"))
+    source: str = field(metadata=column(_TEXT, "the kind of head source it was read from"))
+    mesh_path: str = field(
+        metadata=column(_TEXT, 'of the mesh, relative to the root of its source, with "/"')
+    )
+    file_sha256: tuple[tuple[str, str], ...] = field(
+        metadata=column(
+            list_of(_FILE), "path (as mesh_path) and SHA-256 of every file that decides the result"
+        )
+    )
+    license: str = field(metadata=column(_TEXT, "the head's own licence", check="identity"))
+    redistributable: bool = field(
+        metadata=column(pa.bool_(), "may renders of the head be published?", check="identity")
+    )
+    attribution: str = field(metadata=column(_TEXT, "whom its licence wants named"))
+    units: str = field(metadata=column(_TEXT, "unit of the mesh, such as cm"))
+    mm_per_unit: float = field(metadata=column(_NUMBER, "millimetres in one unit of the mesh"))
+    up: str = field(metadata=column(_TEXT, "the mesh's axis of the crown, such as +Y"))
+    forward: str = field(metadata=column(_TEXT, "the mesh's axis of the nose, such as +Z"))
+    pivot: tuple[float, float, float] = field(
+        metadata=column(list_of(_NUMBER, 3), "centre of the rotation in the mesh's own units and axes")
+    )
+    radius_mm: float = field(metadata=column(_NUMBER, "of the sphere about the pivot that holds the face"))
+    distance_mm: float = field(metadata=column(_NUMBER, "camera to pivot", check="camera"))
+    lens_mm: float = field(metadata=column(_NUMBER, "focal length on a 36 mm sensor", check="camera"))
+    projection: Projection = field(
+        default="perspective",
+        metadata=column(_TEXT, "perspective or orthographic", check="camera", since="1.1.0"),
+    )
+    frame: str = field(
+        default="source",
+        metadata=column(
+            _TEXT, "where pose zero is: source (the mesh's own axes) or canonical (levelled)", since="1.1.0"
+        ),
+    )
+    correction: tuple[float, ...] = field(
+        default=IDENTITY,
+        metadata=column(
+            list_of(_NUMBER, 9),
+            "R_U, row-major, that turns the mesh from its own axes (after up and forward) to the "
+            "canonical pose zero; applied only where frame is canonical",
+        ),
+    )
+    correction_sd_deg: tuple[float, ...] = field(
+        default=(NAN,) * 3,
+        metadata=column(
+            list_of(_NUMBER, 3),
+            "how sure it is, about the axes of yaw, pitch and roll; NaN where no face was found",
+            since="1.1.0",
+        ),
+    )
+    anchor_views: int = field(
+        default=0,
+        metadata=column(
+            _COUNT,
+            "detections that the anchors are the mean of; 0: no face was found near the front",
+            check="anchors",
+            since="1.1.0",
+        ),
+    )
+    anchor_off: int = field(
+        default=0,
+        metadata=column(
+            _COUNT,
+            "points that fell off the silhouette, or past it, and lie on the nearest surface",
+            check="anchors",
+            since="1.1.0",
+        ),
+    )
+    anchor_absent: int = field(
+        default=FACE_MESH.count,
+        metadata=column(
+            _COUNT, "points without an anchor: NaN in landmarks_exact", check="anchors", since="1.1.0"
+        ),
+    )
+    anchor_residual_px: float = field(
+        default=NAN,
+        metadata=column(
+            _NUMBER,
+            "rms distance of the detections from the projected anchors, pixels of views 384 wide",
+            check="anchors",
+            since="1.1.0",
+        ),
+    )
+    anchor_residual_mm: float = field(
+        default=NAN,
+        metadata=column(
+            _NUMBER,
+            "median distance of the hits from the anchors on the surface",
+            check="anchors",
+            since="1.1.0",
+        ),
+    )
+    anchor_asymmetry_mm: float = field(
+        default=NAN,
+        metadata=column(
+            _NUMBER,
+            "rms distance of each anchor from the mirror image of its partner",
+            check="anchors",
+            since="1.1.0",
+        ),
+    )
+    vertices: int = field(metadata=column(_COUNT, "of the mesh"))
+    triangles: int = field(metadata=column(_COUNT, "of the mesh"))
+    problems: tuple[str, ...] = field(
+        default=(),
+        metadata=column(list_of(_TEXT), "what was wrong but did not stop the head from being built"),
+    )
+    split: str = field(metadata=column(_TEXT, "train or validation", check="identity"))
 
     def camera(self, resolution: int) -> Camera:
         """The camera that saw this head."""
         return Camera.square(resolution, self.lens_mm, self.distance_mm, self.projection)
 
 
-def _list(kind: pa.DataType, size: int = -1) -> pa.DataType:
-    return pa.list_(pa.field("element", kind, nullable=False), size)
+HEADS: dict[str, Column] = {
+    f.name: Column(f.name, default=None if f.default is MISSING else f.default, **f.metadata)
+    for f in fields(HeadRow)
+}
+"""Every column of heads.parquet by its name, in the order of the table."""
 
 
-_FILE = pa.struct(
-    [pa.field("path", pa.string(), nullable=False), pa.field("sha256", pa.string(), nullable=False)]
-)
-
-HEADS_SCHEMA = pa.schema(
-    [
-        pa.field(name, kind, nullable=False)
-        for name, kind in (
-            ("subject", pa.string()),
-            ("expression", pa.string()),
-            ("source", pa.string()),
-            ("mesh_path", pa.string()),
-            ("file_sha256", _list(_FILE)),
-            ("license", pa.string()),
-            ("redistributable", pa.bool_()),
-            ("attribution", pa.string()),
-            ("units", pa.string()),
-            ("mm_per_unit", pa.float64()),
-            ("up", pa.string()),
-            ("forward", pa.string()),
-            ("pivot", _list(pa.float64(), 3)),
-            ("radius_mm", pa.float64()),
-            ("distance_mm", pa.float64()),
-            ("lens_mm", pa.float64()),
-            ("projection", pa.string()),
-            ("frame", pa.string()),
-            ("correction", _list(pa.float64(), 9)),
-            ("correction_sd_deg", _list(pa.float64(), 3)),
-            ("anchor_views", pa.int32()),
-            ("anchor_off", pa.int32()),
-            ("anchor_absent", pa.int32()),
-            ("anchor_residual_px", pa.float64()),
-            ("anchor_residual_mm", pa.float64()),
-            ("anchor_asymmetry_mm", pa.float64()),
-            ("vertices", pa.int32()),
-            ("triangles", pa.int32()),
-            ("problems", _list(pa.string())),
-            ("split", pa.string()),
-        )
-    ],
-    metadata={"headturn.schema_version": SCHEMA_VERSION},
-)
+def heads_schema(schema_version: str = SCHEMA_VERSION) -> pa.Schema:
+    """The schema of heads.parquet; of an earlier version: with only the columns of its time."""
+    known = [column.field(FACE_MESH) for column in columns_at(HEADS, schema_version)]
+    return pa.schema(known, metadata={"headturn.schema_version": schema_version})
 
 
 def write_heads(heads: Sequence[HeadRow], root: Path) -> None:
     """Write heads.parquet, sorted by subject and expression. Raises DatasetError if it cannot."""
     rows = [_as_dict(head) for head in sorted(heads, key=lambda head: (head.subject, head.expression))]
-    table = pa.Table.from_pylist(rows, schema=HEADS_SCHEMA)
+    _write(pa.Table.from_pylist(rows, schema=heads_schema()), root)
+
+
+def copy_heads(source: Path, chosen: Collection[tuple[str, str]], target: Path) -> None:
+    """Write the chosen (subject, expression) of source's heads.parquet into target, as today's columns
+    and with those of a later schema that we do not know. Raises DatasetError as :func:`read_heads` does."""
+    heads = [head for head in read_heads(source) if (head.subject, head.expression) in chosen]
+    stored = _read(source / HEADS_FILE)
+    if not is_newer(stored_version(stored.schema)):
+        write_heads(heads, target)
+        return
+    names = zip(*(stored.column(name).to_pylist() for name in ("subject", "expression")), strict=True)
+    _write(stored.filter(pa.array([name in chosen for name in names])), target)
+
+
+def read_heads(root: Path) -> list[HeadRow]:
+    """The heads of a dataset, in the order of the file; what an older one lacks holds its default.
+
+    Raises DatasetError: the file is missing, damaged, of another version, or names a head twice.
+    """
+    path = root / HEADS_FILE
+    table = _read(path)
+    version = stored_version(table.schema)
+    expected = heads_schema(version)
+    known = table.select([name for name in table.schema.names if name in HEADS])
+    if not (known if is_newer(version) else table).schema.equals(expected):
+        raise DatasetError(f"{path}: not the columns of a table of heads; run `headturn build` again")
+    heads = [_from_dict(row) for row in known.to_pylist()]
+    if len({(head.subject, head.expression) for head in heads}) < len(heads):
+        raise DatasetError(f"{path}: a head is there twice; run `headturn build` again")
+    return heads
+
+
+def heads_version(root: Path) -> str:
+    """The schema version of heads.parquet. Raises DatasetError as :func:`read_heads` does."""
+    return stored_version(_read(root / HEADS_FILE).schema)
+
+
+def _read(path: Path) -> pa.Table:
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+    except (OSError, pa.ArrowException, ValueError) as error:
+        raise DatasetError(
+            f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"
+        ) from error
+    check_schema_version(stored_version(table.schema), str(path))
+    return table
+
+
+def _write(table: pa.Table, root: Path) -> None:
     write_atomically(
         root / HEADS_FILE,
         lambda file: pq.write_table(table, file, compression="zstd", write_page_checksum=True),
@@ -141,36 +231,13 @@ def write_heads(heads: Sequence[HeadRow], root: Path) -> None:
     )
 
 
-def read_heads(root: Path) -> list[HeadRow]:
-    """The heads of a dataset, in the order of the file.
-
-    Raises DatasetError: the file is missing, damaged, of another version, or names a head twice.
-    """
-    path = root / HEADS_FILE
-    try:
-        table = pq.read_table(path, page_checksum_verification=True)
-        rows = table.to_pylist()
-    except (OSError, pa.ArrowException, ValueError) as error:
-        raise DatasetError(
-            f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"
-        ) from error
-    version = (table.schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
-    check_schema_version(version, str(path))
-    if not table.schema.equals(HEADS_SCHEMA):
-        raise DatasetError(f"{path}: not the columns of a table of heads; run `headturn build` again")
-    heads = [_from_dict(row) for row in rows]
-    if len({(head.subject, head.expression) for head in heads}) < len(heads):
-        raise DatasetError(f"{path}: a head is there twice; run `headturn build` again")
-    return heads
-
-
 def _as_dict(head: HeadRow) -> dict[str, Any]:
-    values = {field.name: getattr(head, field.name) for field in fields(head)}
+    values = {name: getattr(head, name) for name in HEADS}
     values["file_sha256"] = [{"path": path, "sha256": sha256} for path, sha256 in head.file_sha256]
     return values
 
 
 def _from_dict(values: dict[str, Any]) -> HeadRow:
     files = tuple((file["path"], file["sha256"]) for file in values["file_sha256"])
-    lists = {name: tuple(values[name]) for name in ("pivot", "correction", "correction_sd_deg", "problems")}
+    lists = {name: tuple(value) for name, value in values.items() if isinstance(value, list)}
     return HeadRow(**{**values, **lists, "file_sha256": files})

@@ -11,13 +11,15 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, get_type_hints
 
-from generator.dataset.format.anchors_table import ANCHORS_FILE
+from generator.dataset.format.anchors_table import ANCHORS_FILE, ANCHORS_SINCE
+from generator.dataset.format.columns import IMAGE_MODES, SCHEMA_VERSION, ImageMode
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256, one_line, write_bytes
 from generator.dataset.format.heads_table import HEADS_FILE
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import IMAGE_MODES, SCHEMA_VERSION, ImageMode, check_schema_version
+from generator.dataset.format.schema import check_schema_version, is_newer
 from generator.errors import DatasetError
+from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE
 
 MANIFEST_FILE = "manifest.json"
@@ -35,7 +37,8 @@ class Manifest:
         why, and how many units failed and are recorded in failures.jsonl.
     created_by: the command line, for people; the only field that may differ
         between two builds of the same configuration.
-    tables: SHA-256 of heads.parquet, anchors.parquet and poses.csv; :func:`write_manifest` fills it in.
+    tables: SHA-256 of the files of :func:`side_tables`; :func:`write_manifest` fills it in.
+    others: values of a later schema that we do not know, kept as they are.
     """
 
     versions: dict[str, str]
@@ -48,6 +51,7 @@ class Manifest:
     created_by: str = ""
     tables: dict[str, str] = field(default_factory=dict)
     schema_version: str = SCHEMA_VERSION
+    others: dict[str, Any] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -86,6 +90,7 @@ class Manifest:
             "tables": self.tables,
             "parts": [asdict(part) for part in sorted(self.parts, key=lambda part: part.path)],
             "created_by": self.created_by,
+            **self.others,
         }
 
 
@@ -97,6 +102,19 @@ def configuration_digest(configuration: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def parts_configuration(manifest: Manifest) -> dict[str, Any]:
+    """The configuration whose digest stands in the metadata of the parts."""
+    if is_newer("1.1.0", manifest.schema_version):  # before a dataset could grow: all of it
+        return manifest.configuration
+    return common_values(manifest.configuration)
+
+
+def side_tables(schema_version: str) -> tuple[str, ...]:
+    """Names of the tables that lie beside the parts of a dataset of this schema version."""
+    anchors = () if is_newer(ANCHORS_SINCE, schema_version) else (ANCHORS_FILE,)
+    return (HEADS_FILE, *anchors, POSES_FILE)
+
+
 def portable_command(arguments: Sequence[str]) -> str:
     """A command line without the folders of the machine it ran on: "/home/x/a.toml" becomes "a.toml"."""
     return " ".join(_without_folder(argument) for argument in arguments)
@@ -105,10 +123,10 @@ def portable_command(arguments: Sequence[str]) -> str:
 def write_manifest(manifest: Manifest, root: Path) -> None:
     """Write manifest.json atomically, as the last file of a dataset.
 
-    Raises DatasetError: heads.parquet, anchors.parquet or poses.csv is not there, or it cannot write.
+    Raises DatasetError: one of its :func:`side_tables` is not there, or it cannot write.
     """
     try:
-        tables = {name: file_sha256(root / name) for name in (HEADS_FILE, ANCHORS_FILE, POSES_FILE)}
+        tables = {name: file_sha256(root / name) for name in side_tables(manifest.schema_version)}
     except OSError as error:
         raise DatasetError(
             f"{error.filename}: cannot be read ({error.strerror}); write it before the manifest"
@@ -135,6 +153,9 @@ def read_manifest(root: Path) -> Manifest:
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
         check_schema_version(values["schema_version"], str(path))
+        if is_newer(values["schema_version"]):
+            names = get_type_hints(PartInfo)
+            values["parts"] = [{name: part[name] for name in names} for part in values["parts"]]
         manifest = _parse(values)
         changed = [key for key, value in manifest.as_dict().items() if values[key] != value]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -170,7 +191,13 @@ def _parse(values: dict[str, Any]) -> Manifest:
         created_by=values["created_by"],
         tables=values["tables"],
         schema_version=values["schema_version"],
+        others=_unknown(values) if is_newer(values["schema_version"]) else {},
     )
+
+
+def _unknown(values: dict[str, Any]) -> dict[str, Any]:
+    known = Manifest({}, {}, (), "none", 0).as_dict()
+    return {key: value for key, value in values.items() if key not in known}
 
 
 def _without_folder(argument: str) -> str:

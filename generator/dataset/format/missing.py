@@ -3,23 +3,38 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal, cast
 
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.open import as_array
 from generator.errors import UsageError
-from generator.geometry.camera import project_with
+from generator.geometry.camera import isotropic_pixels
 
-Choice = Literal["masked", "exact", "frontal"]
-CHOICES: tuple[Choice, ...] = get_args(Choice)
+Missing = Literal["fail", "keep", "skip", "exact", "frontal"]
+
+MISSING: dict[Missing, str] = {
+    "fail": "refuse, and name a row",
+    "keep": "keep the row as it is, without landmarks",
+    "skip": "leave the row out",
+    "exact": "fill in the exact landmarks, each row marked as such",
+    "frontal": "fill in the head's own frontal detection, turned to the pose, each row marked as such",
+}
+"""What can be done about rows without a detection, by the one name it has everywhere."""
+
+CHOICES: tuple[Missing, ...] = ("keep", "exact", "frontal")
+"""Those of :func:`fill_missing`."""
+
+ALIASES: dict[str, Missing] = {"masked": "keep"}
+"""Earlier names."""
 
 
-def fill_missing(table: pa.Table, choice: Choice) -> tuple[np.ndarray, np.ndarray]:
+def fill_missing(table: pa.Table, choice: str) -> tuple[np.ndarray, np.ndarray]:
     """Landmarks of every row, and where each row's come from.
 
-    ``masked``   missing rows stay NaN.
+    ``keep``     missing rows stay NaN.
     ``exact``    the exact landmarks in the detector's units: projected to pixels, depth from the
                  pivot scaled like x and y at the pivot. Right about the pose, but not what the
                  detector would have said: its errors are missing.
@@ -28,23 +43,25 @@ def fill_missing(table: pa.Table, choice: Choice) -> tuple[np.ndarray, np.ndarra
 
     Parameters
     ----------
-    table: rows of a dataset, all columns (or those used below).
+    table: rows of a dataset of any 1.x, all columns (or those used below).
 
     Returns
     -------
-    (float32 [N, 468, 3] in isotropic pixels, frame C; text [N] "detected", "exact", "frontal" or
-    "missing"). "missing" are NaN: always with "masked"; with "frontal" where a head was detected
+    (float32 [N, P, 3] in isotropic pixels, frame C; text [N] "detected", "exact", "frontal" or
+    "missing"). "missing" are NaN: always with "keep"; with "frontal" where a head was detected
     nowhere; with "exact" where it has no anchors. Single points without an anchor are NaN in
     "exact" rows.
 
     Raises UsageError for an unknown choice.
     """
+    choice = ALIASES.get(choice, cast(Missing, choice))
     if choice not in CHOICES:
         raise UsageError(f"missing detections: {choice!r} is none of {', '.join(CHOICES)}")
+    table = with_defaults(table, todays_schema(table.schema))
     landmarks = as_array(table, "landmarks").copy()
     detected = as_array(table, "detected").astype(bool)
     origin = np.where(detected, "detected", "missing")
-    if choice == "masked":
+    if choice == "keep":
         return landmarks, origin
     filled = exact_in_pixels(table) if choice == "exact" else rotated_frontal(table)
     use = ~detected & np.isfinite(filled).all(axis=2).any(axis=1)
@@ -53,23 +70,15 @@ def fill_missing(table: pa.Table, choice: Choice) -> tuple[np.ndarray, np.ndarra
 
 
 def exact_in_pixels(table: pa.Table) -> np.ndarray:
-    """Exact landmarks as the detector would give them, float32 [N, 468, 3], isotropic pixels, frame C.
-
-    x, y: projected. z: (Z - t_z) f / t_z, so that a unit is worth as much as in x and y.
-    """
-    exact = as_array(table, "landmarks_exact").astype(np.float64)
-    matrix = as_array(table, "camera").reshape(-1, 3, 3)
-    distance = as_array(table, "translation_mm")[:, 2]
-    orthographic = np.array(table.column("projection").to_pylist()) == "orthographic"
-    pixels = project_with(matrix, exact, np.where(orthographic, distance, np.nan))
-    z = (exact[..., 2] - distance[:, None]) * (matrix[:, 0, 0] / distance)[:, None]
-    return np.concatenate([pixels, z[..., None]], axis=2).astype(np.float32)
+    """Exact landmarks as the detector would give them, float32 [N, P, 3], isotropic pixels, frame C."""
+    exact, matrix, shift = (as_array(table, name) for name in ("landmarks_exact", "camera", "translation_mm"))
+    return isotropic_pixels(exact, matrix, shift, table.column("projection").to_pylist()).astype(np.float32)
 
 
 def rotated_frontal(table: pa.Table) -> np.ndarray:
     """Each head's detection nearest to the front, turned about its centroid to each row's pose.
 
-    float32 [N, 468, 3]; NaN for heads that were detected nowhere.
+    float32 [N, P, 3]; NaN for heads that were detected nowhere.
     """
     landmarks = as_array(table, "landmarks").astype(np.float64)
     detected = as_array(table, "detected").astype(bool)

@@ -12,10 +12,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
 
+from generator.dataset.format.columns import ROWS
+from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.manifest import Manifest
-from generator.dataset.format.part import BATCH, PartInfo
-from generator.dataset.format.schema import LANDMARK_COLUMNS
+from generator.dataset.format.part import BATCH, part_schema_of
+from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.schema import topology_of
 from generator.errors import DatasetError
+from generator.landmarks.topology import FACE_MESH, Topology
 
 OPEN_PARTS = 64
 
@@ -28,6 +32,7 @@ def read_rows(
 ) -> Iterator[pa.RecordBatch]:
     """The rows of some parts, batch by batch: only some columns, only those that fulfil where.
 
+    Columns that older parts lack hold their defaults; where is about columns of schema 1.0.
     Raises DatasetError: a part is missing or damaged.
     """
     try:
@@ -35,21 +40,43 @@ def read_rows(
         for start in range(0, len(parts), OPEN_PARTS):
             paths = [str(root / part.path) for part in parts[start : start + OPEN_PARTS]]
             data = ds.dataset(paths, format="parquet")
-            yield from data.to_batches(columns=columns, filter=where, batch_size=BATCH)
+            today = todays_schema(data.schema, paths[0])
+            if set(columns or today.names) <= set(data.schema.names):
+                yield from data.to_batches(columns=columns, filter=where, batch_size=BATCH)
+                continue
+            stored = [name for name in columns or today.names if name in data.schema.names]
+            # Without any column a batch would not know how long it is.
+            for batch in data.to_batches(columns=stored or ["sample_id"], filter=where, batch_size=BATCH):
+                yield with_defaults(batch, today, columns or today.names)
     except (OSError, pa.ArrowException) as error:
         # The whole message on one line: its first sentence does not name the file.
         what = " ".join(str(error).split())
         raise DatasetError(f"{root}: {what}; `headturn verify` says what is wrong") from error
 
 
+def dataset_topology(root: Path, manifest: Manifest) -> Topology:
+    """What the landmarks of a dataset are: its first readable part says it; Face Mesh if none can be read.
+
+    Raises DatasetError if no registered topology has that name.
+    """
+    for part in manifest.parts:
+        try:
+            schema = part_schema_of(root / part.path)
+        except DatasetError:
+            continue  # whoever reads its rows says what is wrong with it
+        return topology_of(schema, str(root / part.path))
+    return FACE_MESH
+
+
 def as_array(table: pa.Table | pa.RecordBatch, name: str) -> np.ndarray:
-    """A column as numpy: [N] of its type, [N, k] for a list, landmarks as [N, 468, 3], text as objects."""
+    """A column as numpy: [N] of its type, [N, k] for a list, landmarks as [N, P, 3], text as objects."""
     column = table.column(name)
     if isinstance(column, pa.ChunkedArray):
         column = column.combine_chunks()
     if not pa.types.is_fixed_size_list(column.type):
         return column.to_numpy(zero_copy_only=False)
-    shape = (-1, 3) if name in LANDMARK_COLUMNS else (column.type.list_size,)
+    values = ROWS[name].values_a_point if name in ROWS else 0
+    shape = (-1, values) if values > 1 else (column.type.list_size,)
     return column.flatten().to_numpy(zero_copy_only=False).reshape(len(column), *shape)
 
 

@@ -1,168 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One unit of work as one Parquet file: build the table, commit it, read it back."""
+"""One unit of work as one Parquet file: commit its table, read it back."""
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import file_sha256, one_line, write_atomically, write_files
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import (
-    LANDMARK_COLUMNS,
-    LANDMARKS,
-    check_name,
-    image_mode,
-    image_path,
-    passes_path,
-    sample_id,
-)
+from generator.dataset.format.schema import check_name, image_mode
+from generator.dataset.format.unit_rows import UnitRows, unit_table
 from generator.errors import DatasetError
-from generator.geometry.camera import Camera
-from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
-from generator.plan.poses import ANGLES, pose_name
-
-NUMPY_TYPES = {pa.float64(): np.float64, pa.float32(): np.float32, pa.bool_(): np.bool_}
-"""Of list elements. (pyarrow's own mapping needs pandas, which a build does not.)"""
 
 ROW_GROUP = 1024
 BATCH = 256
 """Rows read at once: bounds the memory of a check when images are embedded."""
-
-
-@dataclass(frozen=True, eq=False)
-class UnitRows:
-    """What rendering and detecting one unit gives: one head, N poses.
-
-    angles_deg     float64 [N, 3] (yaw, pitch, roll); indices int16 [N, 3]: rows of a PosePlan
-    camera         the camera of every row
-    detected       bool [N]
-    landmarks      float32 [N, 468, 3], isotropic pixels, frame C; NaN where not detected
-    anchors        float64 [468, 3], the points on the mesh at pose zero, frame C, mm, pivot at
-                   the origin; NaN where the head has none
-    visible        bool [N, 468], False where there is no anchor
-    images         N encoded image files; image_suffix is theirs, such as ".png"
-    passes         N multilayer OpenEXR files and the SHA-256 of their decoded floats; None
-                   where no passes were asked for
-    """
-
-    subject: str
-    expression: str
-    split: str
-    head_license: str
-    redistributable: bool
-    angles_deg: np.ndarray
-    indices: np.ndarray
-    cameras: tuple[Camera, ...]
-    detected: np.ndarray
-    landmarks: np.ndarray
-    anchors: np.ndarray
-    visible: np.ndarray
-    images: Sequence[bytes]
-    image_suffix: str = ".png"
-    passes: Sequence[tuple[bytes, str]] | None = None
-
-    def __post_init__(self) -> None:
-        count = len(self.angles_deg)
-        shapes = {
-            "angles_deg": (self.angles_deg.shape, (count, 3)),
-            "indices": (self.indices.shape, (count, 3)),
-            "detected": (self.detected.shape, (count,)),
-            "landmarks": (self.landmarks.shape, (count, LANDMARKS, 3)),
-            "anchors": (self.anchors.shape, (LANDMARKS, 3)),
-            "visible": (self.visible.shape, (count, LANDMARKS)),
-            "images": ((len(self.images),), (count,)),
-        }
-        for name, (actual, expected) in shapes.items():
-            if actual != expected:
-                raise ValueError(f"{name}: expected shape {expected}, got {actual}")
-        finite = np.isfinite(self.landmarks).all(axis=(1, 2))
-        missing = np.isnan(self.landmarks).all(axis=(1, 2))
-        if not np.where(self.detected, finite, missing).all():
-            raise ValueError("landmarks must be finite where detected and all NaN where not")
-        anchored = np.isfinite(self.anchors).all(axis=1)
-        if not np.where(anchored, True, np.isnan(self.anchors).all(axis=1)).all():
-            raise ValueError("an anchor must be finite or all NaN")
-        if self.visible[:, ~anchored].any():
-            raise ValueError("a point without an anchor cannot be visible")
-        if self.passes is not None and len(self.passes) != count:
-            raise ValueError(f"passes: expected {count}, got {len(self.passes)}")
-        for what in ("subject", "expression", "split"):
-            check_name(what, getattr(self, what))
-
-    @property
-    def poses(self) -> list[str]:
-        """The name of each pose."""
-        return [pose_name(*angles) for angles in self.angles_deg.tolist()]
-
-    @property
-    def image_paths(self) -> list[str]:
-        """Where each image is stored with images = "files", relative to the dataset."""
-        return [image_path(self.subject, self.expression, pose, self.image_suffix) for pose in self.poses]
-
-    @property
-    def passes_paths(self) -> list[str]:
-        """Where the passes of each image are stored, relative to the dataset; "" without passes."""
-        if self.passes is None:
-            return [""] * len(self.angles_deg)
-        return [passes_path(self.subject, self.expression, pose) for pose in self.poses]
-
-    @property
-    def landmarks_exact(self) -> np.ndarray:
-        """R_C X + t of the anchors X, float32 [N, 468, 3], frame C, mm."""
-        rotation = rotation_from_angles(self.angles_deg)
-        points = self.anchors @ np.swapaxes(rotation, -1, -2) + self.cameras[0].translation_mm
-        return points.astype(np.float32)
-
-
-def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
-    """The table of one unit, in the order of rows. schema: see ``part_schema`` of the schema module."""
-    count = len(rows.angles_deg)
-    mode = image_mode(schema)
-    rotation = rotation_from_angles(rows.angles_deg)
-    same_everywhere: dict[str, Any] = {
-        "subject": rows.subject,
-        "expression": rows.expression,
-        "split": rows.split,
-        "head_license": rows.head_license,
-        "redistributable": rows.redistributable,
-        "camera": rows.cameras[0].matrix,
-        "translation_mm": rows.cameras[0].translation_mm,
-        "projection": rows.cameras[0].projection,
-        "width": rows.cameras[0].width,
-        "height": rows.cameras[0].height,
-    }
-    values: dict[str, Any] = {
-        **{name: np.broadcast_to(v, (count, *np.shape(v))) for name, v in same_everywhere.items()},
-        "sample_id": [sample_id(rows.subject, rows.expression, pose) for pose in rows.poses],
-        "rotation": rotation,
-        "quaternion": quaternion_from_rotation(rotation),
-        "detected": rows.detected,
-        "landmarks": rows.landmarks,
-        "landmarks_exact": rows.landmarks_exact,
-        "landmarks_visible": rows.visible,
-        "image_path": rows.image_paths if mode == "files" else [""] * count,
-        "image_sha256": [hashlib.sha256(image).hexdigest() for image in rows.images],
-        "passes_path": rows.passes_paths,
-        "passes_sha256": [digest for _, digest in rows.passes] if rows.passes else [""] * count,
-    }
-    for axis, angle in enumerate(ANGLES):
-        values[f"{angle}_deg"] = rows.angles_deg[:, axis]
-        values[f"{angle}_index"] = rows.indices[:, axis]
-    if mode == "embedded":
-        names = [path.rpartition("/")[2] for path in rows.image_paths]
-        values["image"] = [{"bytes": b, "path": n} for b, n in zip(rows.images, names, strict=True)]
-    return pa.table([_column(values[field.name], field.type) for field in schema], schema=schema)
 
 
 def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
@@ -204,8 +66,8 @@ def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> Par
     return write_part(table, root, rows.split, unit)
 
 
-def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
-    """The rows of one part in batches of at most 256, page checksums verified.
+def iter_stored(path: Path) -> Iterator[pa.RecordBatch]:
+    """The rows of one part as they are stored, in batches of at most 256, page checksums verified.
 
     Raises DatasetError: the file is missing, cut short or damaged.
     """
@@ -213,15 +75,25 @@ def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
         yield from file.iter_batches(batch_size=BATCH)
 
 
+def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
+    """As :func:`iter_stored`, with the defaults of columns that an older part lacks."""
+    schema = todays_schema(part_schema_of(path), str(path))
+    for batch in iter_stored(path):
+        yield with_defaults(batch, schema)
+
+
 def part_schema_of(path: Path) -> pa.Schema:
-    """Schema of one part with its metadata. Raises DatasetError as :func:`iter_part` does."""
+    """Schema of one part as it is stored, with its metadata. Raises as :func:`iter_stored` does."""
     with reading(path):
         return pq.read_schema(path)
 
 
 def read_part(path: Path) -> pa.Table:
-    """All rows of one part. Raises DatasetError as :func:`iter_part` does."""
-    schema = part_schema_of(path)
+    """All rows of one part, with the defaults of columns that an older part lacks.
+
+    Raises DatasetError as :func:`iter_stored` does.
+    """
+    schema = todays_schema(part_schema_of(path), str(path))
     return pa.Table.from_batches(iter_part(path), schema=schema)
 
 
@@ -229,11 +101,11 @@ def check_part(path: Path) -> PartInfo:
     """Read a part from the first byte to the last and say what it holds.
 
     path: ``<dataset>/data/<split>/<name>``.
-    Raises DatasetError as :func:`iter_part` does, or if its columns are not those of a part.
+    Raises DatasetError as :func:`iter_stored` does, or if its columns are not those of a part.
     """
     rows, detected, digests = 0, 0, [NO_ROWS]
     heads: set[tuple[str, str]] = set()
-    for batch in iter_part(path):
+    for batch in iter_stored(path):
         with reading(path):
             digests.append(content_digest(batch))
             detected += pc.sum(batch.column("detected")).as_py()
@@ -263,13 +135,6 @@ def reading(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _column(values: Any, kind: pa.DataType) -> pa.Array:
-    if not pa.types.is_fixed_size_list(kind):
-        return pa.array(values, type=kind)
-    flat = np.ascontiguousarray(values, dtype=NUMPY_TYPES[kind.value_type]).reshape(-1)
-    return pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind)
-
-
 def write_table(table: pa.Table, file: BinaryIO) -> None:
     """Write rows as Parquet the way every part is: zstd, page checksums, landmarks split by byte."""
     with part_writer(file, table.schema) as writer:
@@ -285,8 +150,19 @@ def part_writer(file: BinaryIO, schema: pa.Schema) -> pq.ParquetWriter:
         schema,
         compression="zstd",
         use_dictionary=[name for name in scalars if pa.types.is_string(schema.field(name).type)],
-        use_byte_stream_split=[f"{name}.list.element" for name in LANDMARK_COLUMNS],
+        use_byte_stream_split=[f"{name}.list.element" for name in lists if _is_noise(schema.field(name))],
         write_statistics=scalars,
         write_page_index=True,
         write_page_checksum=True,
     )
+
+
+def row_groups(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.Table]:
+    """Batches in tables of at most ROW_GROUP rows, for :func:`part_writer`."""
+    while group := list(islice(batches, ROW_GROUP // BATCH)):
+        yield pa.Table.from_batches(group)
+
+
+def _is_noise(field: pa.Field) -> bool:
+    """Floats of landmarks: nothing but splitting them by byte makes them smaller."""
+    return pa.types.is_fixed_size_list(field.type) and field.type.value_type == pa.float32()

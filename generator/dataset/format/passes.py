@@ -9,31 +9,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from generator.errors import DatasetError, UsageError, WorkerError
-
-PassName = Literal["depth", "normal", "position", "uv", "object_index"]
-PASSES: tuple[PassName, ...] = get_args(PassName)
-
-CHANNELS: dict[str, tuple[str, ...]] = {
-    "depth": ("Z",),
-    "normal": ("X", "Y", "Z"),
-    "position": ("X", "Y", "Z"),
-    "uv": ("U", "V"),
-    "object_index": ("X",),
-}
-
-_BLENDER_NAMES = {
-    "depth": ("Depth",),
-    "normal": ("Normal",),
-    "position": ("Position",),
-    "uv": ("UV",),
-    "object_index": ("IndexOB", "Object Index"),
-}
-"""As the layers are called by Blender 4.x, then by 5.x where it differs."""
+from generator.plan.passes import OBJECT_INDEX, Pass
+from generator.registries import PASSES
 
 _HEADER = {
     "headturn.frame": "C (camera): x image-right, y image-down, z into the scene",
@@ -44,45 +26,36 @@ _HEADER = {
 def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -> dict[str, np.ndarray]:
     """What Blender wrote, in frame C and metres: {"depth.Z": float32 [H, W], ...}.
 
-    passes: those of :data:`PASSES` that are wanted. distance_mm: camera to pivot.
-    Pixels without a surface are NaN, and 0 in object_index.
-    Raises WorkerError if a pass is not in the file.
+    passes: those of the registry :data:`generator.registries.PASSES` that are wanted.
+    distance_mm: camera to pivot. Pixels without a surface hold what the pass says, mostly NaN.
+    Raises WorkerError if a pass is not in the file, UsageError if there is no such pass.
     """
     layers = _layers(read_channels(path))
-
-    def layer(name: str, count: int) -> np.ndarray:
-        for alias in _BLENDER_NAMES[name]:
-            if alias in layers:
-                channels = layers[alias]
-                keys = [next((c for c in options if c in channels), "") for options in _AXES[name][:count]]
-                if all(keys):
-                    return np.stack([channels[key] for key in keys], axis=-1).astype(np.float32)
-        raise WorkerError(f"{path}: no pass {name!r} among {', '.join(sorted(layers))}")
-
-    index = layer("object_index", 1)
-    nothing = index[..., 0] == 0
+    nothing = _layer(OBJECT_INDEX, layers, path)[..., 0] == 0
     made: dict[str, np.ndarray] = {}
     for name in passes:
-        values = index if name == "object_index" else layer(name, len(CHANNELS[name]))
-        if name in ("normal", "position"):
+        wanted: Pass = PASSES.get(name)
+        values = _layer(wanted, layers, path)
+        if wanted.turned:
             x, y, z = np.moveaxis(values, -1, 0)
             values = np.stack([x, -z, y], axis=-1)  # frame B to frame C
-        if name == "position":
+        if wanted.from_pivot:
             values[..., 2] += np.float32(distance_mm * 1e-3)
-        if name != "object_index":
-            values = np.where(nothing[..., None], np.float32("nan"), values)
-        for place, channel in enumerate(CHANNELS[name]):
-            made[f"{name}.{channel}"] = np.ascontiguousarray(values[..., place])
+        values = np.where(nothing[..., None], np.float32(wanted.empty), values)
+        for place, channel in enumerate(wanted.channel_names):
+            made[channel] = np.ascontiguousarray(values[..., place])
     return made
 
 
-_AXES: dict[str, tuple[tuple[str, ...], ...]] = {
-    "depth": (("Z", "V"),),
-    "normal": (("X",), ("Y",), ("Z",)),
-    "position": (("X",), ("Y",), ("Z",)),
-    "uv": (("U", "X"), ("V", "Y")),
-    "object_index": (("X", "V"),),
-}
+def _layer(wanted: Pass, layers: Mapping[str, Mapping[str, np.ndarray]], path: Path) -> np.ndarray:
+    """The channels of a pass as Blender wrote them, float32 [H, W, channels]."""
+    for alias in wanted.layers:
+        if alias in layers:
+            channels = layers[alias]
+            keys = [next((name for name in names if name in channels), "") for names in wanted.axes]
+            if all(keys):
+                return np.stack([channels[key] for key in keys], axis=-1).astype(np.float32)
+    raise WorkerError(f"{path}: no pass {wanted.name!r} among {', '.join(sorted(layers))}")
 
 
 def write_passes(channels: Mapping[str, np.ndarray], path: Path) -> None:

@@ -1,107 +1,98 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table's columns and the facts every part carries in its schema metadata."""
+"""A part's schema: its columns and the facts every part carries in its metadata."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Mapping
-from typing import Literal, get_args
 
 import pyarrow as pa
 
-from generator.errors import DatasetError
-
-SCHEMA_VERSION = "1.1.0"
-LANDMARK_TOPOLOGY = "mediapipe-face-mesh-468"
-LANDMARKS = 468
-
-ImageMode = Literal["none", "files", "embedded"]
-"""Where the images are: nowhere (only their hash), under images/, or in the table itself."""
-
-IMAGE_MODES: tuple[ImageMode, ...] = get_args(ImageMode)
-
-CONVENTIONS = {
-    "frame": "C (camera): x image-right, y image-down, z into the scene; right-handed",
-    "rotation": "R_C = Rx(-pitch) Ry(yaw) Rz(roll), row-major; active, on column vectors, intrinsic X-Y-Z",
-    "angles": "yaw, pitch, roll in degrees",
-    "signs": "yaw > 0: nose to image left; pitch > 0: nose up; roll > 0: crown to image right",
-    "quaternion": "w, x, y, z of R_C with w >= 0",
-    "camera": "K, row-major, pixels; the centre of the first pixel is (0.5, 0.5)",
-    "translation": "the pivot of the rotation in frame C, mm",
-    "landmarks": "468 x (x, y, z) in isotropic pixels, frame C; NaN where detected is false",
-    "landmarks_exact": "the same points on the mesh, R_C X + t, frame C, mm; NaN where a head has no anchor",
-    "landmarks_visible": "is the exact landmark inside the image and nothing of the head in front of it?",
-    "projection": "of (X, Y, Z) in frame C: perspective K (X/Z, Y/Z, 1); orthographic K (X/t_z, Y/t_z, 1)",
-}
-
-
-def _list(kind: pa.DataType, size: int) -> pa.DataType:
-    return pa.list_(pa.field("element", kind, nullable=False), size)
-
-
-_COLUMNS: tuple[tuple[str, pa.DataType], ...] = (
-    ("sample_id", pa.string()),
-    ("subject", pa.string()),
-    ("expression", pa.string()),
-    ("split", pa.string()),
-    ("head_license", pa.string()),
-    ("redistributable", pa.bool_()),
-    ("yaw_deg", pa.float64()),
-    ("pitch_deg", pa.float64()),
-    ("roll_deg", pa.float64()),
-    ("yaw_index", pa.int16()),
-    ("pitch_index", pa.int16()),
-    ("roll_index", pa.int16()),
-    ("rotation", _list(pa.float64(), 9)),
-    ("quaternion", _list(pa.float64(), 4)),
-    ("camera", _list(pa.float64(), 9)),
-    ("translation_mm", _list(pa.float64(), 3)),
-    ("projection", pa.string()),
-    ("detected", pa.bool_()),
-    ("landmarks", _list(pa.float32(), LANDMARKS * 3)),
-    ("landmarks_exact", _list(pa.float32(), LANDMARKS * 3)),
-    ("landmarks_visible", _list(pa.bool_(), LANDMARKS)),
-    ("width", pa.int32()),
-    ("height", pa.int32()),
-    ("image_path", pa.string()),
-    ("image_sha256", pa.string()),
-    ("passes_path", pa.string()),
-    ("passes_sha256", pa.string()),
+from generator.dataset.format.columns import (
+    ROWS,
+    SCHEMA_VERSION,
+    ImageMode,
+    columns_at,
+    version_number,
 )
-
-# Nullable by declaration only (verify proves there are none): Hugging Face
-# datasets takes a struct for an image only if its fields may be null.
-IMAGE_FIELD = pa.field("image", pa.struct([("bytes", pa.binary()), ("path", pa.string())]))
-
-LANDMARK_COLUMNS = ("landmarks", "landmarks_exact")
-"""Columns of incompressible floats, stored with BYTE_STREAM_SPLIT."""
+from generator.errors import DatasetError, UsageError
+from generator.landmarks.topology import FACE_MESH, Topology
+from generator.registries import TOPOLOGIES
 
 
-def part_schema(images: ImageMode, versions: Mapping[str, str], configuration_digest: str) -> pa.Schema:
+def conventions(topology: Topology = FACE_MESH) -> dict[str, str]:
+    """What the numbers of a dataset mean: name of a thing -> its definition."""
+    return {
+        "frame": "C (camera): x image-right, y image-down, z into the scene; right-handed",
+        "rotation": "R_C = Rx(-pitch) Ry(yaw) Rz(roll), row-major; "
+        "active, on column vectors, intrinsic X-Y-Z",
+        "angles": "yaw, pitch, roll in degrees",
+        "signs": "yaw > 0: nose to image left; pitch > 0: nose up; roll > 0: crown to image right",
+        "quaternion": "w, x, y, z of R_C with w >= 0",
+        "camera": "K, row-major, pixels; the centre of the first pixel is (0.5, 0.5)",
+        "translation": "the pivot of the rotation in frame C, mm",
+        "landmarks": f"{topology.count} x (x, y, z) in isotropic pixels, frame C; "
+        "NaN where detected is false",
+        "landmarks_exact": "the same points on the mesh, R_C X + t, frame C, mm; "
+        "NaN where a head has no anchor",
+        "landmarks_visible": "is the exact landmark inside the image and nothing of the head in front of it?",
+        "projection": "of (X, Y, Z) in frame C: perspective K (X/Z, Y/Z, 1); "
+        "orthographic K (X/t_z, Y/t_z, 1)",
+    }
+
+
+CONVENTIONS = conventions()
+"""Those of Face Mesh."""
+
+
+def part_schema(
+    images: ImageMode,
+    versions: Mapping[str, str],
+    configuration_digest: str,
+    topology: Topology = FACE_MESH,
+    schema_version: str = SCHEMA_VERSION,
+) -> pa.Schema:
     """Schema of one part: columns in order, none nullable, and the metadata.
 
     versions: name and version of every package that decides the content.
     configuration_digest: of :func:`generator.plan.first_settings.common_values`.
+    topology: what the landmarks are. schema_version: an earlier one has only the columns of its time.
     """
-    fields = [pa.field(name, kind, nullable=False) for name, kind in _COLUMNS]
+    columns = [column for column in columns_at(ROWS, schema_version) if column.is_in(images)]
     metadata = {
-        "headturn.schema_version": SCHEMA_VERSION,
-        "headturn.conventions": _json(CONVENTIONS),
-        "headturn.landmark_topology": LANDMARK_TOPOLOGY,
+        "headturn.schema_version": schema_version,
+        "headturn.conventions": _json(conventions(topology)),
+        "headturn.landmark_topology": topology.name,
         "headturn.images": images,
         "headturn.versions": _json(versions),
         "headturn.configuration_digest": configuration_digest,
     }
     if images == "embedded":
-        fields.append(IMAGE_FIELD)
         metadata["huggingface"] = _json({"info": {"features": {"image": {"_type": "Image"}}}})
-    return pa.schema(fields, metadata=metadata)
+    return pa.schema([column.field(topology) for column in columns], metadata=metadata)
 
 
 def image_mode(schema: pa.Schema) -> str:
     """Where the images are, from the metadata :func:`part_schema` wrote."""
     return schema.metadata[b"headturn.images"].decode()
+
+
+def topology_of(schema: pa.Schema, where: str = "the schema") -> Topology:
+    """What the landmarks are, from the metadata :func:`part_schema` wrote.
+
+    where: the file, for the message. Raises DatasetError if no registered topology has that name.
+    """
+    name = (schema.metadata or {}).get(b"headturn.landmark_topology", b"none").decode(errors="replace")
+    try:
+        return TOPOLOGIES.get(name)
+    except UsageError as error:
+        raise DatasetError(f"{where}: {error}; read it with the Headturn that wrote it") from error
+
+
+def stored_version(schema: pa.Schema) -> str:
+    """The schema version a file says it has; "none" if it says nothing."""
+    return (schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
 
 
 def versions_of(schema: pa.Schema) -> dict[str, str]:
@@ -111,13 +102,21 @@ def versions_of(schema: pa.Schema) -> dict[str, str]:
 
 
 def check_schema_version(version: str, where: str) -> None:
-    """Raises DatasetError unless this program reads that version (same major and minor number)."""
-    expected = SCHEMA_VERSION.rpartition(".")[0]
-    if version.rpartition(".")[0] != expected:
+    """Raises DatasetError unless this program reads that version (same major number).
+
+    What an earlier one lacks has a default; what a later one has besides is left alone.
+    """
+    number, ours = version_number(str(version)), SCHEMA_VERSION.split(".")[0]
+    if number is None or str(number[0]) != ours:
         raise DatasetError(
-            f"{where}: schema version {version!r}, expected {expected}.x; build it again from its "
+            f"{where}: schema version {version!r}, expected {ours}.x; build it again from its "
             "config.toml into another folder, or read it with the version of Headturn that wrote it"
         )
+
+
+def is_newer(version: str, than: str = SCHEMA_VERSION) -> bool:
+    """Is this a later schema version, whose columns we may not all know?"""
+    return (version_number(version) or (0, 0, 0)) > (version_number(than) or (0, 0, 0))
 
 
 def check_name(what: str, name: str) -> None:

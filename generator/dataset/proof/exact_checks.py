@@ -11,7 +11,9 @@ import pyarrow as pa
 from generator.dataset.format.anchors_table import HeadAnchors
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.open import as_array
-from generator.dataset.proof.row_checks import named
+from generator.dataset.format.row_cameras import RowCameras
+from generator.dataset.proof.context import RowContext
+from generator.dataset.proof.named import named
 from generator.geometry.rigid import fit_rotations
 from generator.geometry.rotation import geodesic_deg
 
@@ -43,54 +45,44 @@ def anchor_problems(heads: Sequence[HeadRow], anchors: dict[tuple[str, str], Hea
             yield f"anchors.parquet: {head.subject}/{head.expression}: weights do not add up to 1"
 
 
-def exact_problems(
-    batch: pa.RecordBatch, heads: Sequence[HeadRow], head_index: np.ndarray, points: np.ndarray
-) -> tuple[list[str], float]:
-    """Each row's exact landmarks and visibility against its anchors; and the largest closure error.
+def exact_problems(batch: pa.RecordBatch, context: RowContext) -> list[str]:
+    """Each row's exact landmarks and visibility against its anchors and its camera.
 
-    points: float64 [heads, 468, 3], anchors at pose zero, frame C. The closure error is the
-    angle in degrees between R_C and the rotation of the rigid fit of points to landmarks_exact.
+    Notes closure_deg: the largest angle in degrees between R_C and the rotation of the rigid fit of
+    the anchors to landmarks_exact.
     """
     exact = as_array(batch, "landmarks_exact").astype(np.float64)
     visible = as_array(batch, "landmarks_visible").astype(bool)
     rotation = as_array(batch, "rotation").reshape(-1, 3, 3)
-    translation = as_array(batch, "translation_mm")
-    anchors = points[head_index]
-    expected = anchors @ np.swapaxes(rotation, -1, -2) + translation[:, None]
+    cameras = RowCameras.of(batch)
+    anchors = context.anchors[context.head_index]
+    expected = anchors @ np.swapaxes(rotation, -1, -2) + cameras.translation_mm[:, None]
     anchored = np.isfinite(anchors).all(axis=2)
     # One rounding to float32, and the last bit of the sum that was rounded.
     allowed = np.spacing(np.abs(np.nan_to_num(expected)).astype(np.float32))
     off = np.where(anchored[..., None], ~(np.abs(exact - expected) <= allowed), ~np.isnan(exact))
     problems = list(named(batch, off.any(axis=(1, 2)), "landmarks_exact is not R_C X + t of its anchors"))
     problems += named(batch, (visible & ~anchored).any(axis=1), "a landmark without an anchor is visible")
-    sizes = as_array(batch, "width")
-    outside = np.zeros(len(batch), dtype=bool)
-    closure = 0.0
-    for place in np.unique(head_index):
-        rows = np.flatnonzero(head_index == place)
+    for place in np.unique(context.head_index):
+        rows = np.flatnonzero(context.head_index == place)
         inside = anchored[rows[0]]
-        for size in np.unique(sizes[rows]):
-            same = rows[sizes[rows] == size]
-            pixels = heads[place].camera(int(size)).project(np.nan_to_num(expected[same], nan=1.0))
-            beyond = ((pixels < 0) | (pixels > size)).any(axis=2)
-            outside[same] = (visible[same] & beyond & inside).any(axis=1)
         sound = rows[~off[rows].any(axis=(1, 2))]
         if inside.sum() < 3 or not len(sound):
             continue
-        fitted = fit_rotations(anchors[rows[0], inside], exact[sound][:, inside])
-        errors = geodesic_deg(fitted, rotation[sound])
-        allowed_deg = CLOSURE_DEG + _rounding_deg(anchors[rows[0], inside], heads[place].distance_mm)
+        points = anchors[rows[0], inside]
+        errors = geodesic_deg(fit_rotations(points, exact[sound][:, inside]), rotation[sound])
         wrong = np.zeros(len(batch), dtype=bool)
-        wrong[sound] = errors > allowed_deg
+        wrong[sound] = errors > CLOSURE_DEG + _rounding_deg(points, cameras.translation_mm[sound, 2])
         problems += named(batch, wrong, "the rigid fit of landmarks_exact does not give rotation back")
-        closure = max(closure, float(errors.max()))
-    problems += named(batch, outside, "a landmark outside the image is visible")
-    return problems, closure
+        context.note("closure_deg", float(errors.max()))
+    beyond = anchored & ~cameras.inside(cameras.pixels(np.nan_to_num(expected, nan=1.0)))
+    problems += named(batch, (visible & beyond).any(axis=1), "a landmark outside the image is visible")
+    return problems
 
 
-def _rounding_deg(points: np.ndarray, distance_mm: float) -> float:
-    """Six standard deviations of the rotation of a fit to points rounded to float32 at distance."""
-    sigma = float(np.spacing(np.float32(distance_mm))) / np.sqrt(12)
+def _rounding_deg(points: np.ndarray, distance_mm: np.ndarray) -> np.ndarray:
+    """Six standard deviations of the rotation of a fit to points rounded to float32 at each distance."""
+    sigma = np.spacing(distance_mm.astype(np.float32)).astype(np.float64) / np.sqrt(12)
     centred = points - points.mean(axis=0)
     weakest = np.linalg.svd(centred, compute_uv=False)[-2:]
-    return float(np.rad2deg(6 * sigma / np.sqrt((weakest**2).sum())))
+    return np.rad2deg(6 * sigma / np.sqrt((weakest**2).sum()))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,27 +12,21 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from generator.dataset.format.anchors_table import HeadAnchors
+from generator.dataset.format.columns import ROWS
+from generator.dataset.format.dataset_poses import DatasetPoses
+from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import add_digests, content_digest
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.heads_table import HeadRow
-from generator.dataset.format.manifest import Manifest, configuration_digest
-from generator.dataset.format.open import as_array
-from generator.dataset.format.part import PartInfo, iter_part, part_schema_of, reading
-from generator.dataset.format.schema import LANDMARK_TOPOLOGY, LANDMARKS, SCHEMA_VERSION, part_schema
-from generator.dataset.proof.exact_checks import exact_problems
-from generator.dataset.proof.pass_checks import pass_problems
-from generator.dataset.proof.row_checks import (
-    camera_problems,
-    identity_problems,
-    image_problems,
-    landmark_problems,
-    rotation_problems,
-)
+from generator.dataset.format.manifest import Manifest, configuration_digest, parts_configuration
+from generator.dataset.format.open import as_array, dataset_topology
+from generator.dataset.format.part import iter_stored, part_schema_of, reading
+from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.schema import is_newer, part_schema
+from generator.dataset.proof.context import RowContext, planned_cameras
+from generator.dataset.proof.row_checks import row_checks
 from generator.dataset.proof.verify_report import Check
-from generator.dataset.show.detection import Places
 from generator.errors import HeadturnError
-from generator.plan.first_settings import common_values
-from generator.plan.poses import PosePlan, pose_name
 
 
 @dataclass
@@ -41,12 +35,12 @@ class PartFindings:
 
     checks: by name; those without problems may be absent. digest: None where it could not be read.
     heads, poses: int32 [N], the place of each known row in heads.parquet and poses.csv;
-    detected: bool [N]. closure_deg: see :class:`generator.dataset.proof.verify_report.VerifyReport`.
+    detected: bool [N]. measured: see :class:`generator.dataset.proof.context.RowContext`.
     """
 
     rows: int = 0
     digest: str | None = None
-    closure_deg: float = 0.0
+    measured: dict[str, float] = field(default_factory=dict)
     checks: dict[str, Check] = field(default_factory=dict)
     heads: list[np.ndarray] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
@@ -65,24 +59,31 @@ class PartChecker:
         root: Path,
         manifest: Manifest,
         heads: list[HeadRow],
-        plan: PosePlan,
+        poses: DatasetPoses,
         anchors: dict[tuple[str, str], HeadAnchors],
     ) -> None:
-        self._root, self._manifest, self._heads, self._plan = root, manifest, heads, plan
-        self._places = Places(heads, plan)
-        self._names = [pose_name(*pose) for pose in plan.angles_deg.tolist()]
-        self._points = np.full((len(heads), LANDMARKS, 3), np.nan)
+        self._root, self._manifest = root, manifest
+        self._poses = poses
+        self._checks = row_checks(manifest.schema_version)
+        topology = dataset_topology(root, manifest)
+        points = np.full((len(heads), topology.count, 3), np.nan)
         for place, head in enumerate(heads):
-            if found := anchors.get((head.subject, head.expression)):
-                self._points[place] = found.points
-        common = configuration_digest(common_values(manifest.configuration))
-        self._schema = part_schema(manifest.images, {}, common)
-        self._metadata = {
-            b"headturn.schema_version": manifest.schema_version.encode(),
-            b"headturn.landmark_topology": LANDMARK_TOPOLOGY.encode(),
-            b"headturn.images": manifest.images.encode(),
-            b"headturn.configuration_digest": common.encode(),
-        }
+            found = anchors.get((head.subject, head.expression))
+            if found is not None and found.points.shape == points.shape[1:]:
+                points[place] = found.points
+        self._context = RowContext(
+            root=root,
+            images=manifest.images,
+            heads=heads,
+            poses=poses,
+            anchors=points,
+            expected_camera=planned_cameras(heads, poses, manifest, root),
+        )
+        common = configuration_digest(parts_configuration(manifest))
+        self._schema = part_schema(manifest.images, {}, common, topology, manifest.schema_version)
+        named = ("schema_version", "landmark_topology", "images", "configuration_digest")
+        keys = [f"headturn.{name}".encode() for name in named]
+        self._metadata = {key: self._schema.metadata[key] for key in keys}
 
     def quick(self, part: PartInfo) -> PartFindings:
         """Size, footer and schema of a part, without reading its rows."""
@@ -114,19 +115,22 @@ class PartChecker:
                 found.add(
                     "part hashes", [f"{part.path} was changed or damaged after the build (SHA-256 differs)"]
                 )
-            wrong = self._schema_problems(part_schema_of(path))
+            stored = part_schema_of(path)
+            wrong = self._schema_problems(stored)
             found.add("schema", (f"{part.path}: {problem}" for problem in wrong))
             if wrong:
                 return found
             rows, detected, digests = 0, 0, []
-            for batch in iter_part(path):
+            today = todays_schema(stored, str(path))
+            for batch in iter_stored(path):
                 if nulls := [name for name in batch.schema.names if _nulls(batch.column(name))]:
                     found.add("no nulls", (f"{part.path}: nulls in {name}" for name in nulls))
                     continue
                 rows += len(batch)
                 detected += int(as_array(batch, "detected").sum())
-                digests.append(content_digest(batch))
-                self._check_rows(batch, part, found)
+                with reading(path):
+                    digests.append(content_digest(batch))
+                self._check_rows(with_defaults(batch, today), part, found)
         except (OSError, HeadturnError, UnicodeDecodeError) as error:
             found.add("part hashes", [f"{part.path} cannot be read: {error}"])
             return found
@@ -138,7 +142,7 @@ class PartChecker:
         return found
 
     def _check_rows(self, batch: pa.RecordBatch, part: PartInfo, found: PartFindings) -> None:
-        heads, poses = self._places.of(batch)
+        heads, poses = self._poses.of(batch)
         known = (heads >= 0) & (poses >= 0)
         if not known.all():
             unknown = batch.filter(pa.array(~known)).column("sample_id").to_pylist()
@@ -149,19 +153,15 @@ class PartChecker:
         found.heads.append(heads)
         found.poses.append(poses)
         found.detected.append(as_array(batch, "detected").astype(bool))
-        split = part.path.split("/")[1]
-        found.add(
-            "identity",
-            identity_problems(batch, self._heads, self._plan, self._names, heads, poses, split),
+        context = replace(
+            self._context,
+            split=part.path.split("/")[1],
+            head_index=heads,
+            pose_index=poses,
+            measured=found.measured,
         )
-        found.add("rotation", rotation_problems(batch))
-        found.add("camera", camera_problems(batch, self._heads, heads))
-        found.add("landmarks", landmark_problems(batch))
-        problems, closure = exact_problems(batch, self._heads, heads, self._points)
-        found.add("exact landmarks", problems)
-        found.closure_deg = max(found.closure_deg, closure)
-        found.add("images", image_problems(batch, self._manifest.images, self._root))
-        found.add("passes", pass_problems(batch, self._heads, heads, self._root))
+        for name, check in self._checks.items():
+            found.add(name, check(batch, context))
 
     def _schema_problems(self, schema: pa.Schema) -> list[str]:
         metadata = schema.metadata or {}
@@ -171,12 +171,14 @@ class PartChecker:
             for key, value in self._metadata.items()
             if metadata.get(key) != value
         ]
+        if is_newer(self._manifest.schema_version):  # it may have columns that we do not know
+            schema = pa.schema([field for field in schema if field.name in ROWS])
         if not schema.equals(self._schema):
             names = set(schema.names) ^ set(self._schema.names) or {
                 field.name for field in self._schema if not schema.field(field.name).equals(field)
             }
             what = ", ".join(sorted(names)) or "their order"
-            wrong.append(f"columns differ from schema {SCHEMA_VERSION}: {what}")
+            wrong.append(f"columns differ from schema {self._manifest.schema_version}: {what}")
         return wrong
 
 

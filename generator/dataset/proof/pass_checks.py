@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.open import as_array
 from generator.dataset.format.passes import passes_sha256, read_channels
+from generator.dataset.format.row_cameras import RowCameras
 from generator.dataset.format.schema import passes_path
+from generator.dataset.proof.context import RowContext
 from generator.errors import DatasetError, UsageError
-from generator.geometry.camera import Camera
+from generator.plan.passes import DEPTH, POSITION
 
 PROJECTION_PX = 0.01
 """How near the position of a pixel must be projected to the pixel's centre."""
@@ -31,9 +31,7 @@ MAX_DISAGREEING = 0.01
 """Share of a row's landmarks for which ray cast and depth may differ, for the same reason."""
 
 
-def pass_problems(
-    batch: pa.RecordBatch, heads: Sequence[HeadRow], head_index: np.ndarray, root: Path
-) -> Iterator[str]:
+def pass_problems(batch: pa.RecordBatch, context: RowContext) -> Iterator[str]:
     """The passes of rows that have some, against hash, K, exact landmarks and visibility."""
     names = batch.column("sample_id").to_pylist()
     paths = batch.column("passes_path").to_pylist()
@@ -42,7 +40,7 @@ def pass_problems(
         return
     exact = as_array(batch, "landmarks_exact").astype(np.float64)
     visible = as_array(batch, "landmarks_visible").astype(bool)
-    sizes = as_array(batch, "width").tolist()
+    cameras = RowCameras.of(batch)
     for row, (name, path, sha256) in enumerate(zip(names, paths, hashes, strict=True)):
         if not path and not sha256:
             continue
@@ -51,55 +49,59 @@ def pass_problems(
             yield f"{name}: passes_path {path!r} is not where its passes belong"
             continue
         try:
-            channels = read_channels(root / path)
+            channels = read_channels(context.root / path)
         except (DatasetError, UsageError) as error:
             yield str(error)
             continue
         if passes_sha256(channels) != sha256:
             yield f"{path}: the passes are not those that were rendered (SHA-256 differs)"
             continue
-        size = sizes[row]
-        if any(values.shape != (size, size) for values in channels.values()):
+        camera = cameras[row : row + 1]
+        size = (int(camera.height[0]), int(camera.width[0]))
+        if any(values.shape != size for values in channels.values()):
             yield f"{path}: not the size of the image"
             continue
-        camera = heads[head_index[row]].camera(size)
-        if "position.X" in channels:
-            position = np.stack([channels[f"position.{axis}"] for axis in "XYZ"], axis=-1) * 1e3
+        if set(POSITION.channel_names) <= set(channels):
+            position = np.stack([channels[name] for name in POSITION.channel_names], axis=-1) * 1e3
             off = projection_error_px(position, camera)
             if not off <= PROJECTION_PX:
                 yield f"{path}: positions do not project onto their own pixels (off by {off:.3g} px)"
-        if "depth.Z" in channels:
-            wrong = disagreement(channels["depth.Z"] * 1e3, exact[row], visible[row], camera)
+        if set(DEPTH.channel_names) <= set(channels):
+            depth = channels[DEPTH.channel_names[0]] * 1e3
+            wrong = disagreement(depth, exact[row], visible[row], camera)
             if wrong > MAX_DISAGREEING:
                 yield f"{path}: landmarks_visible and depth disagree on {wrong:.1%} of the landmarks"
 
 
-def projection_error_px(position_mm: np.ndarray, camera: Camera) -> float:
+def projection_error_px(position_mm: np.ndarray, camera: RowCameras) -> float:
     """Distance, in x or y, from a pixel's centre to where K puts what it shows: exceeded by a
     thousandth of the pixels.
 
-    position_mm: float [H, W, 3], frame C, NaN where there is no surface. 0 without a surface.
+    position_mm: float [H, W, 3], frame C, NaN where there is no surface. camera: that of the one row.
+    0 without a surface.
     """
     height, width = position_mm.shape[:2]
     centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
     there = np.isfinite(position_mm).all(axis=-1)
     if not there.any():
         return 0.0
-    off = np.abs(camera.project(position_mm[there]) - centres[there]).max(axis=1)
+    seen = camera.pixels(position_mm[there][None])[0, :, :2]
+    off = np.abs(seen - centres[there]).max(axis=1)
     return float(np.quantile(off, 1 - SLIVERS, method="lower"))
 
 
-def disagreement(depth_mm: np.ndarray, exact: np.ndarray, visible: np.ndarray, camera: Camera) -> float:
+def disagreement(depth_mm: np.ndarray, exact: np.ndarray, visible: np.ndarray, camera: RowCameras) -> float:
     """Share of the landmarks inside the image that one of ray cast and depth sees and the other not.
 
-    depth_mm: float [H, W], NaN where there is no surface. exact: float [468, 3], frame C, mm.
+    depth_mm: float [H, W], NaN where there is no surface. exact: float [P, 3], frame C, mm.
+    camera: that of the one row.
     A landmark agrees with the depth pass if its depth lies among those of the 3 x 3 pixels around
     it where it is visible, and behind the nearest of them where it is hidden.
     """
-    size = len(depth_mm)
+    height, width = depth_mm.shape
     known = np.flatnonzero(np.isfinite(exact).all(axis=1))
-    pixels = np.floor(camera.project(exact[known])).astype(int)
-    inside = ((pixels >= 1) & (pixels < size - 1)).all(axis=1)
+    pixels = np.floor(camera.pixels(exact[None, known])[0, :, :2]).astype(int)
+    inside = ((pixels >= 1) & (pixels < (width - 1, height - 1))).all(axis=1)
     known, pixels = known[inside], pixels[inside]
     if not len(known):
         return 0.0

@@ -4,55 +4,51 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.columns import ROWS, SCHEMA_VERSION, columns_at
 from generator.dataset.format.files import file_sha256
-from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.open import as_array
-from generator.dataset.format.schema import ImageMode, image_path, sample_id
+from generator.dataset.format.schema import image_path, sample_id
+from generator.dataset.proof.context import RowContext
+from generator.dataset.proof.exact_checks import exact_problems
+from generator.dataset.proof.named import named
+from generator.dataset.proof.pass_checks import pass_problems
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
-from generator.plan.poses import ANGLES, PosePlan
+from generator.plan.poses import ANGLES
 
-TOLERANCE = 1e-12
+TOLERANCE, CAMERA_TOLERANCE = 1e-12, 1e-9
 Problems = Iterator[str]
+RowCheck = Callable[[pa.RecordBatch, RowContext], Iterable[str]]
 
 
-def identity_problems(
-    batch: pa.RecordBatch,
-    heads: Sequence[HeadRow],
-    plan: PosePlan,
-    names: Sequence[str],
-    head_index: np.ndarray,
-    pose_index: np.ndarray,
-    split: str,
-) -> Problems:
-    """Name, split, licence and place in the grid, against heads.parquet and poses.csv.
-
-    names: of the plan's poses. head_index, pose_index: int [N], place of each row, none below 0.
-    split: the folder the part lies in.
-    """
+def identity_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
+    """Name, split, licence and place in the grid, against heads.parquet and poses.csv."""
     facts = (batch.column(n).to_pylist() for n in ("sample_id", "split", "head_license", "redistributable"))
     indices = np.stack([as_array(batch, f"{angle}_index") for angle in ANGLES], axis=-1)
-    off = (indices != plan.indices[pose_index]).any(axis=1)
-    rows = zip(*facts, head_index.tolist(), pose_index.tolist(), off.tolist(), strict=True)
-    for name, row_split, license_, redistributable, i, k, off_grid in rows:
-        head = heads[i]
-        expected = sample_id(head.subject, head.expression, names[k])
+    off = (indices != context.poses.indices(context.head_index, context.pose_index)).any(axis=1)
+    places = (context.head_index.tolist(), context.pose_index.tolist())
+    for name, row_split, license_, redistributable, i, k, off_grid in zip(
+        *facts, *places, off.tolist(), strict=True
+    ):
+        head = context.heads[i]
+        expected = sample_id(head.subject, head.expression, context.poses.name(i, k))
         if name != expected:
             yield f"{name} should be called {expected}"
-        if row_split != split or head.split != split:
-            yield f"{name}: split {row_split!r} in data/{split}, {head.split!r} in heads.parquet"
+        if row_split != context.split or head.split != context.split:
+            yield f"{name}: split {row_split!r} in data/{context.split}, {head.split!r} in heads.parquet"
         if license_ != head.license or redistributable != head.redistributable:
             yield f"{name}: licence differs from heads.parquet ({license_!r}, {head.license!r})"
         if off_grid:
             yield f"{name}: place in the grid differs from poses.csv"
 
 
-def rotation_problems(batch: pa.RecordBatch) -> Problems:
+def rotation_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:
     """Matrix and quaternion against the angles, to 1e-12."""
     angles = np.stack([as_array(batch, f"{angle}_deg") for angle in ANGLES], axis=-1)
     finite = np.isfinite(angles).all(axis=1)
@@ -67,23 +63,26 @@ def rotation_problems(batch: pa.RecordBatch) -> Problems:
     yield from named(batch, finite & turned, "quaternion does not agree with the angles")
 
 
-def camera_problems(batch: pa.RecordBatch, heads: Sequence[HeadRow], head_index: np.ndarray) -> Problems:
-    """K, translation and projection against heads.parquet."""
-    width, height = as_array(batch, "width"), as_array(batch, "height")
-    pairs, pair_of_row = np.unique(np.stack([width, head_index]), axis=1, return_inverse=True)
-    cameras = [heads[i].camera(size) for size, i in pairs.T.tolist()]
-    matrices = np.stack([camera.matrix.reshape(-1) for camera in cameras])[pair_of_row.ravel()]
-    offsets = np.stack([camera.translation_mm for camera in cameras])[pair_of_row.ravel()]
-    yield from named(batch, (width != height) | (width <= 0), "not the width and height of a square image")
+def camera_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
+    """Size, K, translation and projection against the camera that the row has to have."""
+    places = zip(context.head_index.tolist(), context.pose_index.tolist(), strict=True)
+    cameras = [context.expected_camera(head, pose) for head, pose in places]
+    facts = {
+        camera: (camera.matrix.reshape(-1), camera.translation_mm, [camera.width, camera.height])
+        for camera in dict.fromkeys(cameras)
+    }
+    matrices, offsets, sizes = (np.stack(v) for v in zip(*(facts[c] for c in cameras), strict=True))
+    off = (as_array(batch, "width") != sizes[:, 0]) | (as_array(batch, "height") != sizes[:, 1])
+    yield from named(batch, off, "width or height is not that of the camera's image")
     for name, expected in (("camera", matrices), ("translation_mm", offsets)):
-        wrong = _far(as_array(batch, name), expected, 1e-9)
-        yield from named(batch, wrong, f"{name} differs from heads.parquet")
+        wrong = _far(as_array(batch, name), expected, CAMERA_TOLERANCE)
+        yield from named(batch, wrong, f"{name} is not what the configuration plans")
     projections = batch.column("projection").to_pylist()
-    wrong = np.array([p != heads[i].projection for p, i in zip(projections, head_index, strict=True)])
-    yield from named(batch, wrong, "projection differs from heads.parquet")
+    wrong = np.array([p != camera.projection for p, camera in zip(projections, cameras, strict=True)])
+    yield from named(batch, wrong, "projection is not what the configuration plans")
 
 
-def landmark_problems(batch: pa.RecordBatch) -> Problems:
+def landmark_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:
     """Finite where detected, all NaN where not."""
     landmarks, detected = as_array(batch, "landmarks"), as_array(batch, "detected").astype(bool)
     finite, missing = np.isfinite(landmarks).all(axis=(1, 2)), np.isnan(landmarks).all(axis=(1, 2))
@@ -91,8 +90,9 @@ def landmark_problems(batch: pa.RecordBatch) -> Problems:
     yield from named(batch, ~detected & ~missing, "not detected, but a landmark is not NaN")
 
 
-def image_problems(batch: pa.RecordBatch, mode: ImageMode, root: Path) -> Problems:
+def image_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
     """Every image is there and its SHA-256 is the row's."""
+    mode, root = context.images, context.root
     names = batch.column("sample_id").to_pylist()
     hashes = batch.column("image_sha256").to_pylist()
     paths = batch.column("image_path").to_pylist()
@@ -129,9 +129,22 @@ def _far(actual: np.ndarray, expected: np.ndarray, tolerance: float = TOLERANCE)
     return ~(np.abs(actual - expected) <= tolerance).all(axis=1)
 
 
-def named(batch: pa.RecordBatch, wrong: np.ndarray, what: str) -> Problems:
-    """One problem a row that is wrong, with its sample_id. wrong: bool [N]."""
-    if wrong.any():
-        names = batch.column("sample_id")
-        for row in np.flatnonzero(wrong).tolist():
-            yield f"{names[row].as_py()}: {what}"
+ROW_CHECKS: Mapping[str, RowCheck] = {
+    "identity": identity_problems,
+    "rotation": rotation_problems,
+    "camera": camera_problems,
+    "landmarks": landmark_problems,
+    "exact landmarks": exact_problems,
+    "images": image_problems,
+    "passes": pass_problems,
+}
+"""What is proved of rows, each over several columns, which name it."""
+
+
+def row_checks(schema_version: str = SCHEMA_VERSION) -> dict[str, RowCheck]:
+    """The checks of the rows of a dataset of this schema version: those its columns name, in the order
+    above, and then those that belong to one column, by its name."""
+    columns = columns_at(ROWS, schema_version)
+    wanted = {column.check for column in columns}
+    own: dict[str, Any] = {column.name: column.check for column in columns if callable(column.check)}
+    return {name: check for name, check in ROW_CHECKS.items() if name in wanted} | own

@@ -14,40 +14,36 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.dataset.format.anchors_table import ANCHORS_FILE, read_anchors
+from generator.dataset.format.anchors_table import ANCHORS_SINCE, read_anchors
+from generator.dataset.format.columns import SCHEMA_VERSION
+from generator.dataset.format.dataset_poses import read_dataset_poses
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256
-from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
-from generator.dataset.format.manifest import POSES_FILE, Manifest, read_manifest
+from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.manifest import Manifest, read_manifest, side_tables
 from generator.dataset.format.part_info import PartInfo
+from generator.dataset.format.schema import is_newer
 from generator.dataset.proof.exact_checks import anchor_problems
 from generator.dataset.proof.part_checks import PartChecker, PartFindings
+from generator.dataset.proof.row_checks import row_checks
 from generator.dataset.proof.verify_report import Check, VerifyReport
 from generator.dataset.show.detection import DetectionTally
 from generator.errors import DatasetError, HeadturnError
-from generator.plan.poses import PosePlan, csv_plan, pose_name
 from generator.process import available_cores
 
-CHECKS = (
-    "manifest",
-    "heads and poses",
-    "part files",
-    "part hashes",
-    "schema",
-    "no nulls",
-    "every row once",
-    "identity",
-    "rotation",
-    "camera",
-    "landmarks",
-    "anchors",
-    "exact landmarks",
-    "images",
-    "passes",
-    "digest",
-)
+_FIRST = ("manifest", "heads and poses", "part files", "part hashes", "schema", "no nulls", "every row once")
+_QUICK = ("manifest", "heads and poses", "part files", "part sizes", "schema", "rows", "anchors")
 
-QUICK_CHECKS = ("manifest", "heads and poses", "part files", "part sizes", "schema", "rows", "anchors")
+
+def check_names(quick: bool = False, schema_version: str = SCHEMA_VERSION) -> list[str]:
+    """What is checked of a dataset of this schema version, in the order of the report."""
+    names = list(_QUICK) if quick else [*_FIRST, *row_checks(schema_version), "digest"]
+    if is_newer(ANCHORS_SINCE, schema_version):
+        return [name for name in names if name != "anchors"]
+    if not quick:
+        names.insert(names.index("exact landmarks"), "anchors")
+    return names
+
 
 ROWS_A_WORKER = 5000
 """With fewer rows than this for each, starting another process takes longer than it saves."""
@@ -76,30 +72,34 @@ def verify_dataset(
     DatasetError: a process that was checking parts was killed.
     """
     root = Path(path)
-    checks = {name: Check(name) for name in (QUICK_CHECKS if quick else CHECKS)}
-    report = VerifyReport(tuple(checks.values()), quick=quick)
+    checks = {name: Check(name) for name in check_names(quick)}
     try:
         manifest = read_manifest(root)
     except DatasetError as error:
         checks["manifest"].add([str(error)])
-        return report
+        return VerifyReport(tuple(checks.values()), quick=quick)
+    # An older dataset has fewer columns, and fewer things to be wrong about.
+    checks = {name: Check(name) for name in check_names(quick, manifest.schema_version)}
+    report = VerifyReport(tuple(checks.values()), quick=quick)
     checks["manifest"].done = True
     try:
-        heads, plan = read_heads(root), csv_plan(root / POSES_FILE)
+        heads = read_heads(root)
+        poses = read_dataset_poses(root, heads)
         anchors = read_anchors(root)
-        tables = (HEADS_FILE, ANCHORS_FILE, POSES_FILE)
+        tables = side_tables(manifest.schema_version)
         changed = [name for name in tables if file_sha256(root / name) != manifest.tables.get(name)]
+        checker = PartChecker(root, manifest, heads, poses, anchors)
     except (OSError, HeadturnError) as error:
         checks["heads and poses"].add([str(error)])
         return report
     checks["heads and poses"].add(f"{name} was changed after the build (SHA-256 differs)" for name in changed)
-    checks["anchors"].add(anchor_problems(heads, anchors))
+    if "anchors" in checks:
+        checks["anchors"].add(anchor_problems(heads, anchors))
     for check in checks.values():
         check.done = True
     parts = _present_parts(root, manifest, checks["part files"])
-    tally = DetectionTally(heads, plan)
+    tally = DetectionTally(heads, poses)
     rows, closure_deg, digests = 0, 0.0, []
-    checker = PartChecker(root, manifest, heads, plan, anchors)
     with _findings(root, checker, manifest, parts, quick, workers) as findings:
         for done, found in enumerate(findings, start=1):
             for name, problems in found.checks.items():
@@ -107,7 +107,7 @@ def verify_dataset(
             if found.digest is not None:
                 rows += found.rows
                 digests.append(found.digest)
-            closure_deg = max(closure_deg, found.closure_deg)
+            closure_deg = max(closure_deg, found.measured.get("closure_deg", 0.0))
             for places in zip(found.heads, found.poses, found.detected, strict=True):
                 tally.add(*places)
             if progress:
@@ -116,16 +116,18 @@ def verify_dataset(
         checks["heads and poses"].add(
             [f"heads.parquet has {len(heads)} heads, the manifest says {manifest.heads}"]
         )
-    whole = replace(report, heads=len(heads), poses=len(plan), rows=rows)
+    whole = replace(report, heads=len(heads), poses=poses.most, rows=rows)
     if quick:
-        if rows != len(heads) * len(plan):
-            checks["rows"].add([f"{rows} rows, expected {len(heads)} heads x {len(plan)} poses"])
+        if rows != poses.rows:
+            checks["rows"].add(
+                [f"{rows} rows, expected {poses.rows}: {len(heads)} heads x {poses.most} poses"]
+            )
         return replace(
             whole,
             detected_rows=manifest.detected_rows,
             detection_rate=manifest.detected_rows / manifest.rows if manifest.rows else float("nan"),
         )
-    _check_every_row_once(tally, heads, plan, manifest, checks["every row once"])
+    _check_every_row_once(tally, manifest, checks["every row once"])
     if add_digests(digests) != manifest.digest:
         checks["digest"].add(["the digest of all rows is not the manifest's"])
     return replace(
@@ -147,18 +149,16 @@ def _present_parts(root: Path, manifest: Manifest, check: Check) -> list[PartInf
     return [part for part in manifest.parts if part.path in found]
 
 
-def _check_every_row_once(
-    tally: DetectionTally, heads: list[HeadRow], plan: PosePlan, manifest: Manifest, check: Check
-) -> None:
+def _check_every_row_once(tally: DetectionTally, manifest: Manifest, check: Check) -> None:
     """What only all rows together can show: none missing, none twice."""
     seen = tally.rows
-    if manifest.failures and (seen == 0).any():
+    missing = (seen == 0) & (np.arange(seen.shape[1]) < tally.poses.counts[:, None])
+    if manifest.failures and missing.any():
         check.add([f"{manifest.failures} units failed, see failures.jsonl"])
-    for wrong, what in ((seen == 0, "is missing"), (seen > 1, "is there more than once")):
+    for wrong, what in ((missing, "is missing"), (seen > 1, "is there more than once")):
         for place, k in np.argwhere(wrong).tolist():
-            head = heads[place]
-            pose = pose_name(*plan.angles_deg[k].tolist())
-            check.add([f"{head.subject}/{head.expression}/{pose} {what}"])
+            head = tally.heads[place]
+            check.add([f"{head.subject}/{head.expression}/{tally.poses.name(place, k)} {what}"])
 
 
 @contextmanager
@@ -194,8 +194,8 @@ _checker: PartChecker
 def _open(root: Path) -> None:
     global _checker
     manifest = read_manifest(root)
-    plan = csv_plan(root / POSES_FILE)
-    _checker = PartChecker(root, manifest, read_heads(root), plan, read_anchors(root))
+    heads = read_heads(root)
+    _checker = PartChecker(root, manifest, heads, read_dataset_poses(root, heads), read_anchors(root))
 
 
 def _check(part: PartInfo, *, quick: bool) -> PartFindings:

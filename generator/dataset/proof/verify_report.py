@@ -99,7 +99,8 @@ class VerifyReport:
         if self.quick:
             lines.append("quick: sizes and footers only; without --quick every byte is read")
         elif self.rows:
-            lines.append(f"exact landmarks give R_C back to {self.closure_deg:.1g}°")
+            if any(check.name == "exact landmarks" for check in self.checks):
+                lines.append(f"exact landmarks give R_C back to {self.closure_deg:.1g}°")
             lines += [
                 f"  yaw {cell.yaw_deg:+g}, pitch {cell.pitch_deg:+g}: {cell.rate:.0%} of {cell.rows}"
                 for cell in self.worst_cells

@@ -8,29 +8,16 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from generator.dataset.format.columns import ROWS, columns_at
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
 from generator.dataset.format.manifest import Manifest
-from generator.dataset.format.schema import CONVENTIONS
+from generator.dataset.format.open import dataset_topology
+from generator.dataset.format.schema import conventions
+from generator.dataset.show.column_tables import column_rows, markdown_table
+from generator.landmarks.topology import FACE_MESH, Topology
 
 CARD_FILE = "README.md"
-
-COLUMNS = (
-    ("sample_id, subject, expression, split", "identity; sample_id is subject/expression/pose"),
-    ("head_license, redistributable", "licence of the head; may its images be published?"),
-    ("yaw_deg, pitch_deg, roll_deg", "the pose, degrees, exact"),
-    ("yaw_index, pitch_index, roll_index", "place in the grid, -1 off the grid"),
-    ("rotation", "R_C, 9 numbers, row-major"),
-    ("quaternion", "w, x, y, z of R_C"),
-    ("camera, translation_mm", "K, 9 numbers, row-major, pixels; the head's pivot in the camera frame"),
-    ("detected", "was the face found?"),
-    ("landmarks", "1404 numbers: 468 x (x, y, z), isotropic pixels; NaN where not detected"),
-    ("projection", "perspective or orthographic"),
-    ("landmarks_exact", "1404 numbers: the same points on the mesh, frame C, mm; NaN without an anchor"),
-    ("landmarks_visible", "468 flags: does the camera see the exact landmark?"),
-    ("width, height, image_path, image_sha256", "the image; its path is relative to this folder"),
-    ("passes_path, passes_sha256", "OpenEXR passes and the hash of their floats; empty without"),
-)
 
 _READING = """\
 ```python
@@ -47,7 +34,7 @@ from datasets import load_dataset
 rows = load_dataset("DIR")                               # heads: load_dataset("DIR", "heads")
 ```
 
-Landmarks as an array: `np.stack(rows["landmarks"]).reshape(-1, 468, 3)`.
+Landmarks as an array: `np.stack(rows["landmarks"]).reshape(len(rows), -1, 3)`.
 """
 
 
@@ -56,10 +43,11 @@ def write_card(manifest: Manifest, root: Path) -> None:
 
     Raises DatasetError if it cannot.
     """
-    write_bytes(root / CARD_FILE, dataset_card(manifest, read_heads(root)).encode())
+    text = dataset_card(manifest, read_heads(root), dataset_topology(root, manifest))
+    write_bytes(root / CARD_FILE, text.encode())
 
 
-def dataset_card(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
+def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topology = FACE_MESH) -> str:
     """The text of README.md."""
     rate = f"{manifest.detected_rows / manifest.rows:.1%}" if manifest.rows else "none"
     images = {
@@ -73,7 +61,11 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
     )
     other_tables = (
         "`heads.parquet` has a row a head: source, licence, file hashes, pivot, scale, camera, known "
-        "problems. `poses.csv` lists the poses; every head has each of them once."
+        "problems. `poses.csv` lists the poses: of every head, or head by head where each has its own; every "
+        "row is one of them."
+    )
+    columns = column_rows(
+        columns_at(ROWS, manifest.schema_version), topology, lambda column: column.is_in(manifest.images)
     )
     sections = [
         _front_matter(manifest, heads),
@@ -82,9 +74,9 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
         f"Images: {images}.",
         "## Licences\n\n" + licences_text(heads),
         "## Reading\n\n" + _READING.rstrip(),
-        "## Columns of data/\n\n" + markdown_table(("column", "meaning"), COLUMNS),
+        "## Columns of data/\n\n" + markdown_table(("column", "type", "meaning"), columns),
         other_tables,
-        "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(CONVENTIONS.items())),
+        "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(conventions(topology).items())),
     ]
     return "\n\n".join(sections) + "\n"
 
@@ -120,13 +112,3 @@ def licences_text(heads: Sequence[HeadRow]) -> str:
             "show heads whose licence forbids it."
         )
     return text
-
-
-def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
-
-
-def _cell(text: str) -> str:
-    return " ".join(text.replace("|", "\\|").split())

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
+from generator.dataset.format.dataset_poses import DatasetPoses, read_dataset_poses
 from generator.dataset.format.heads_table import HeadRow, read_heads
-from generator.dataset.format.manifest import POSES_FILE, Manifest
+from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import as_array, read_rows
-from generator.plan.poses import ANGLES, PosePlan, csv_plan
+from generator.plan.poses import ANGLES
 
 BIN_DEG = 10
 MAX_CELLS = 30
@@ -35,60 +35,17 @@ class Cell:
         return self.detected / self.rows
 
 
-class Places:
-    """Finds rows in heads.parquet and poses.csv, many at a time: there may be millions of rows."""
-
-    def __init__(self, heads: Sequence[HeadRow], plan: PosePlan) -> None:
-        self._head_index = {(head.subject, head.expression): i for i, head in enumerate(heads)}
-        # A pose is found by its place on each axis, so that only whole numbers are compared.
-        self._axes = [np.unique(axis) for axis in plan.angles_deg.T]
-        keys = self._keys(plan.angles_deg)
-        self._order = np.argsort(keys)
-        self._sorted = keys[self._order]
-
-    def of(self, table: pa.Table | pa.RecordBatch) -> tuple[np.ndarray, np.ndarray]:
-        """int32 [N]: the head and the pose of each row, -1 where unknown."""
-        subjects, expressions = (table.column(name).dictionary_encode() for name in ("subject", "expression"))
-        if isinstance(subjects, pa.ChunkedArray):
-            subjects, expressions = subjects.combine_chunks(), expressions.combine_chunks()
-        index = np.array(
-            [
-                [
-                    self._head_index.get((subject, expression), -1)
-                    for expression in expressions.dictionary.to_pylist()
-                ]
-                for subject in subjects.dictionary.to_pylist()
-            ],
-            np.int32,
-        ).reshape(len(subjects.dictionary), len(expressions.dictionary))
-        heads = index[subjects.indices.to_numpy(), expressions.indices.to_numpy()]
-        keys = self._keys(np.stack([as_array(table, f"{name}_deg") for name in ANGLES], axis=-1))
-        at = np.minimum(np.searchsorted(self._sorted, keys), len(self._sorted) - 1)
-        poses = np.where(self._sorted[at] == keys, self._order[at], -1).astype(np.int32)
-        return heads, poses
-
-    def _keys(self, angles: np.ndarray) -> np.ndarray:
-        """int64 [N], one number a pose, -1 where an angle is not one of the plan's."""
-        keys = np.zeros(len(angles), np.int64)
-        known = np.ones(len(angles), bool)
-        for values, angle in zip(self._axes, angles.T, strict=True):
-            at = np.minimum(np.searchsorted(values, angle), len(values) - 1)
-            known &= values[at] == angle
-            keys = keys * len(values) + at
-        return np.where(known, keys, -1)
-
-
 class DetectionTally:
     """How often each (head, pose) was seen and whether its face was found.
 
     Two bytes a row and nothing else, so millions of rows fit.
-    rows, detected: uint8 [heads, poses].
+    rows, detected: uint8 [heads, poses]; of a head with fewer poses the last are never counted.
     """
 
-    def __init__(self, heads: Sequence[HeadRow], plan: PosePlan) -> None:
-        self.heads, self.plan = heads, plan
-        self.rows = np.zeros((len(heads), len(plan)), np.uint8)
-        self.detected = np.zeros((len(heads), len(plan)), np.uint8)
+    def __init__(self, heads: Sequence[HeadRow], poses: DatasetPoses) -> None:
+        self.heads, self.poses = heads, poses
+        self.rows = np.zeros((len(heads), poses.most), np.uint8)
+        self.detected = np.zeros((len(heads), poses.most), np.uint8)
 
     def add(self, heads: np.ndarray, poses: np.ndarray, detected: np.ndarray) -> None:
         """Count rows by their places, int [N], none below 0; detected: bool [N]."""
@@ -110,12 +67,19 @@ class DetectionTally:
 
     def by_cell(self) -> list[Cell]:
         """Detection over yaw x pitch, sorted; cells of 10° where the poses are off the grid."""
-        angles = self.plan.angles_deg[:, :2]
-        if (self.plan.indices < 0).any() or max(len(np.unique(axis)) for axis in angles.T) > MAX_CELLS:
+        every, starts = self.poses.flat_angles()
+        angles = every[:, :2]
+        if not self.poses.on_grid or max(len(np.unique(axis)) for axis in angles.T) > MAX_CELLS:
             angles = np.round(angles / BIN_DEG) * BIN_DEG + 0.0
         cells, cell_of_pose = np.unique(angles, axis=0, return_inverse=True)
-        rows = np.bincount(cell_of_pose.ravel(), self.rows.sum(axis=0), len(cells)).astype(int)
-        detected = np.bincount(cell_of_pose.ravel(), self.detected.sum(axis=0), len(cells)).astype(int)
+        # Heads that share a plan are counted together.
+        totals = np.zeros((2, len(every)), np.int64)
+        for start in np.unique(starts).tolist():
+            same = starts == start
+            for total, counted in zip(totals, (self.rows, self.detected), strict=True):
+                count = int(self.poses.counts[same][0])
+                total[start : start + count] = counted[same, :count].sum(axis=0)
+        rows, detected = (np.bincount(cell_of_pose.ravel(), t, len(cells)).astype(int) for t in totals)
         return [
             Cell(yaw, pitch, n, k)
             for (yaw, pitch), n, k in zip(cells.tolist(), rows.tolist(), detected.tolist(), strict=True)
@@ -124,12 +88,13 @@ class DetectionTally:
 
 
 def tally_detection(root: Path, manifest: Manifest) -> DetectionTally:
-    """Count a finished dataset. Raises DatasetError or UsageError if one of its files cannot be read."""
-    heads, plan = read_heads(root), csv_plan(root / POSES_FILE)
-    tally, places = DetectionTally(heads, plan), Places(heads, plan)
+    """Count a finished dataset. Raises DatasetError if one of its files cannot be read."""
+    heads = read_heads(root)
+    poses = read_dataset_poses(root, heads)
+    tally = DetectionTally(heads, poses)
     columns = ["subject", "expression", *(f"{name}_deg" for name in ANGLES), "detected"]
     for batch in read_rows(root, manifest.parts, columns):
-        head, pose = places.of(batch)
+        head, pose = poses.of(batch)
         known = (head >= 0) & (pose >= 0)
         tally.add(head[known], pose[known], as_array(batch, "detected")[known])
     return tally

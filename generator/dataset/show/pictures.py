@@ -11,14 +11,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont, UnidentifiedImageError
 
+from generator.dataset.format.dataset_poses import DatasetPoses, read_dataset_poses
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import HeadRow, read_heads
-from generator.dataset.format.manifest import POSES_FILE, Manifest
+from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import image_bytes, read_samples
-from generator.dataset.format.schema import LANDMARKS, sample_id
+from generator.dataset.format.row_cameras import RowCameras
+from generator.dataset.format.schema import sample_id
 from generator.dataset.show.detection import MAX_CELLS, tally_detection
+from generator.dataset.show.fitted import Fitted
 from generator.errors import DatasetError
-from generator.plan.poses import ANGLES, PosePlan, csv_plan, pose_name
+from generator.plan.poses import ANGLES, PosePlan
 
 SHEET_HEADS = 6
 TILE, ANCHOR_TILE, GAP, TOP, LEFT = 168, 224, 8, 40, 132
@@ -59,11 +62,11 @@ def _sheet(
     manifest: Manifest,
     out: Path,
     side: int,
-    mark: Callable[[ImageDraw.ImageDraw, dict, HeadRow, int], None],
+    mark: Callable[[ImageDraw.ImageDraw, dict, Fitted], None],
     caption: Callable[[HeadRow], str],
     legend: list[tuple[str, str]],
 ) -> Path:
-    """mark(draw, row, head, side) draws onto a tile of that side; caption stands below the subject.
+    """mark(draw, row, fitted) draws onto a tile; caption stands below the subject.
 
     legend: what a colour means, in the corner.
     """
@@ -71,17 +74,24 @@ def _sheet(
         raise DatasetError(
             f"{dataset}: built with images = none, so there is nothing to show; build with files or embedded"
         )
-    heads, plan = read_heads(dataset), csv_plan(dataset / POSES_FILE)
-    heads = [heads[i] for i in np.unique(np.linspace(0, len(heads) - 1, SHEET_HEADS).round().astype(int))]
-    poses = plan.angles_deg[shown_poses(plan)].tolist()
-    names = [sample_id(h.subject, h.expression, pose_name(*pose)) for h in heads for pose in poses]
+    heads = read_heads(dataset)
+    poses = read_dataset_poses(dataset, heads)
+    places = np.unique(np.linspace(0, len(heads) - 1, SHEET_HEADS).round().astype(int)).tolist()
+    shown = {place: shown_poses(poses.plan(place)) for place in places}
+    columns = max(map(len, shown.values()))
+    names = [_row_name(heads[p], poses, p, k) for p, chosen in shown.items() for k in chosen]
     rows = read_samples(dataset, manifest, names)
+    own = poses.plans.shared is None
 
-    size = (LEFT + len(poses) * (side + GAP), TOP + len(heads) * (side + GAP))
+    size = (LEFT + columns * (side + GAP), TOP + len(places) * (side + GAP))
     sheet = Image.new("RGB", size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font, small = ImageFont.load_default(14), ImageFont.load_default(12)
-    for column, pose in enumerate(poses):
+    if own:
+        told = "every head has its own poses: yaw, pitch and roll are on each image"
+        draw.text((LEFT, 20), told, FAINT, font, anchor="lm")
+    titles = [] if own else poses.plan(places[0]).angles_deg[shown[places[0]]].tolist()
+    for column, pose in enumerate(titles):
         for place, (name, angle) in enumerate(zip(ANGLES, pose, strict=True)):
             x = LEFT + column * (side + GAP) + side * (2 * place + 1) / 6
             draw.text((x, 12), name, FAINT, small, anchor="mm")
@@ -90,15 +100,22 @@ def _sheet(
         y = 8 + 12 * line
         draw.rectangle((GAP, y - 3, GAP + 6, y + 3), fill=color)
         draw.text((GAP + 11, y), what, FAINT, ImageFont.load_default(11), anchor="lm")
-    for line, head in enumerate(heads):
+    for line, (place, chosen) in enumerate(shown.items()):
+        head = heads[place]
         top = TOP + line * (side + GAP)
         draw.text((GAP, top + side / 2 - 10), _fit(draw, head.subject, font), INK, font, anchor="lm")
         draw.text((GAP, top + side / 2 + 10), _fit(draw, caption(head), small), FAINT, small, anchor="lm")
-        for column, pose in enumerate(poses):
-            row = rows.get(sample_id(head.subject, head.expression, pose_name(*pose)))
+        for column, pose in enumerate(chosen):
+            row = rows.get(_row_name(head, poses, place, pose))
             if row is not None:  # a unit that failed leaves an empty place
-                tile = _picture(dataset, row, side)
-                mark(ImageDraw.Draw(tile), row, head, side)
+                fitted = Fitted.of(row["width"], row["height"], side)
+                tile = fitted.paste(_picture(dataset, row), PAPER)
+                on_tile = ImageDraw.Draw(tile)
+                mark(on_tile, row, fitted)
+                if own:
+                    angles = poses.plan(place).angles_deg[pose].tolist()
+                    said = " ".join(f"{angle:+.0f}" for angle in angles)
+                    on_tile.text((4, 3), said, INK, small, stroke_width=2, stroke_fill=PAPER)
                 sheet.paste(tile, (LEFT + column * (side + GAP), top))
     png = io.BytesIO()
     sheet.save(png, "PNG")
@@ -157,6 +174,10 @@ def _even(values: Iterable[float]) -> list[float]:
     return [known.get(k, found[0] + k * step) for k in range(round(places[-1]) + 1)]
 
 
+def _row_name(head: HeadRow, poses: DatasetPoses, place: int, pose: int) -> str:
+    return sample_id(head.subject, head.expression, poses.name(place, pose))
+
+
 def shown_poses(plan: PosePlan) -> list[int]:
     """The poses of the plan nearest to the ends and the middle of its range, each once."""
     low, high = plan.angles_deg.min(axis=0), plan.angles_deg.max(axis=0)
@@ -166,33 +187,36 @@ def shown_poses(plan: PosePlan) -> list[int]:
     return list(dict.fromkeys(nearest))
 
 
-def _picture(dataset: Path, row: dict, side: int) -> Image.Image:
+def _picture(dataset: Path, row: dict) -> Image.Image:
     try:
-        picture = Image.open(io.BytesIO(image_bytes(dataset, row))).convert("RGB")
+        return Image.open(io.BytesIO(image_bytes(dataset, row))).convert("RGB")
     except (UnidentifiedImageError, OSError) as error:
         raise DatasetError(
             f"{dataset}: the image of {row['sample_id']} cannot be decoded; see `headturn verify`"
         ) from error
-    return picture.resize((side, side), Image.Resampling.LANCZOS)
 
 
-def _mark_detected(draw: ImageDraw.ImageDraw, row: dict, _: HeadRow, side: int) -> None:
+def _mark_detected(draw: ImageDraw.ImageDraw, row: dict, fitted: Fitted) -> None:
+    side = fitted.side
     if row["detected"]:
-        points = np.array(row["landmarks"]).reshape(LANDMARKS, 3)[:, :2] * side / row["width"]
-        draw.point([tuple(point) for point in points.tolist()], DOT)
+        _dots(draw, fitted.points(np.array(row["landmarks"]).reshape(-1, 3)), DOT)
     else:
         draw.rectangle((0, 0, side - 1, side - 1), outline=MISS, width=3)
         draw.rectangle((0, side - 22, side, side), fill=MISS)
         draw.text((side / 2, side - 11), "not detected", "white", ImageFont.load_default(13), anchor="mm")
 
 
-def _mark_exact(draw: ImageDraw.ImageDraw, row: dict, head: HeadRow, side: int) -> None:
-    points = np.array(row["landmarks_exact"]).reshape(LANDMARKS, 3)
-    visible = np.array(row["landmarks_visible"])
+def _mark_exact(draw: ImageDraw.ImageDraw, row: dict, fitted: Fitted) -> None:
+    points = np.array(row["landmarks_exact"]).reshape(-1, 3)
     anchored = np.isfinite(points).all(axis=1)
-    pixels = head.camera(side).project(points[anchored])
+    visible = np.array(row["landmarks_visible"])[anchored]
+    pixels = fitted.points(RowCameras.of_row(row).pixels(points[None, anchored])[0])
     for seen, color in ((False, MISS), (True, DOT)):
-        draw.point([tuple(point) for point in pixels[visible[anchored] == seen].tolist()], color)
+        _dots(draw, pixels[visible == seen], color)
+
+
+def _dots(draw: ImageDraw.ImageDraw, points: np.ndarray, color: str) -> None:
+    draw.point([tuple(point) for point in points.tolist()], color)
 
 
 def _fit(draw: ImageDraw.ImageDraw, text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont) -> str:

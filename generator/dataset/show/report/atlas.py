@@ -13,39 +13,40 @@ import pyarrow as pa
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import as_array, read_rows
-from generator.dataset.format.schema import LANDMARKS
+from generator.dataset.format.row_cameras import COLUMNS as CAMERA
 from generator.dataset.show.report.cells import PoseCells
 from generator.dataset.show.report.errors import RowErrors, row_errors
-from generator.dataset.show.report.regions import REGIONS
+from generator.landmarks.topology import FACE_MESH, Topology
 from generator.plan.poses import ANGLES
 
 NUMBERS = 600_000
 """Numbers that all maps of single heads may hold together: keeps the page at a few megabytes."""
 
 _COLUMNS = [
-    *("subject", "expression", "rotation", "camera", "translation_mm", "projection", "detected"),
-    *("landmarks", "landmarks_exact", *(f"{angle}_deg" for angle in ANGLES)),
+    *("subject", "expression", "rotation", *CAMERA, "detected", "landmarks", "landmarks_exact"),
+    *(f"{angle}_deg" for angle in ANGLES),
 ]
-_LAYERS = 3 + 5 * len(REGIONS) + 7
 
 
 class Atlas:
     """Sums over cells of pose, for all heads together (place 0) and for some heads of their own."""
 
-    def __init__(self, heads: Sequence[HeadRow], cells: PoseCells) -> None:
-        self.cells = cells
-        room = max(1, NUMBERS // (_LAYERS * len(cells)))
+    def __init__(self, heads: Sequence[HeadRow], cells: PoseCells, topology: Topology = FACE_MESH) -> None:
+        self.cells, self.topology = cells, topology
+        regions, points = len(topology.regions), topology.count
+        layers = 3 + 5 * regions + 7
+        room = max(1, NUMBERS // (layers * len(cells)))
         picked = np.unique(np.linspace(0, len(heads) - 1, min(room, len(heads))).round().astype(int))
         self.heads = [heads[i] for i in picked]
         self._slot = {(head.subject, head.expression): k for k, head in enumerate(self.heads, start=1)}
         shape = (len(self.heads) + 1, len(cells))
         self.rows, self.detected, self.compared = (np.zeros(shape, np.int64) for _ in range(3))
-        self._region = np.zeros((*shape, len(REGIONS), 4))
-        self._region_rows = np.zeros((*shape, len(REGIONS)), np.int64)
+        self._region = np.zeros((*shape, regions, 4))
+        self._region_rows = np.zeros((*shape, regions), np.int64)
         self._pose = np.zeros((*shape, 7))  # geodesic; yaw, pitch, roll; their squares
-        self._point_rows = np.zeros(LANDMARKS, np.int64)
-        self._point = np.zeros((LANDMARKS, 4))  # distance; shift in the head's frame
-        self._face = np.zeros((LANDMARKS, 3))  # position in the head's frame, mm
+        self._point_rows = np.zeros(points, np.int64)
+        self._point = np.zeros((points, 4))  # distance; shift in the head's frame
+        self._face = np.zeros((points, 3))  # position in the head's frame, mm
         self._mm = 0.0
         self._by_head: dict[tuple[str, str], np.ndarray] = {}
 
@@ -57,7 +58,7 @@ class Atlas:
         slots = np.array([self._slot.get(name, -1) for name in names], np.int64)
         cells = self.cells.place(np.stack([as_array(batch, f"{angle}_deg") for angle in ANGLES], axis=-1))
         detected = as_array(batch, "detected").astype(bool)
-        errors = row_errors(batch)
+        errors = row_errors(batch, self.topology)
         distance = errors.region[:, 0, 2]
         for name, found in zip(names, detected, strict=True):
             self._by_head.setdefault(name, np.zeros(4))[:2] += (1, found)
@@ -99,7 +100,7 @@ class Atlas:
         return {
             "axes": {name: axis.tolist() for name, axis in zip(ANGLES, self.cells.axes, strict=True)},
             "binned": self.cells.binned,
-            "regions": list(REGIONS),
+            "regions": list(self.topology.regions),
             "picks": ["all heads", *(f"{head.subject} / {head.expression}" for head in self.heads)],
             "maps": [self._map(slot) for slot in range(len(self.heads) + 1)],
             "points": self._points(),
@@ -142,7 +143,7 @@ class Atlas:
                     "distance": _rounded(region[:, k, 2]),
                     "spread": _rounded(spread[:, k]),
                 }
-                for k in range(len(REGIONS))
+                for k in range(region.shape[1])
             ],
             "geodesic": _rounded(pose[:, 0]),
             "turn": [_rounded(axis) for axis in turn.T],
@@ -167,9 +168,10 @@ def collect_atlas(
     heads: Sequence[HeadRow],
     cells: PoseCells,
     progress: Callable[[int], None],
+    topology: Topology = FACE_MESH,
 ) -> Atlas:
     """Read all rows once. Raises DatasetError: a part is missing or damaged."""
-    atlas = Atlas(heads, cells)
+    atlas = Atlas(heads, cells, topology)
     for batch in read_rows(root, manifest.parts, _COLUMNS):
         atlas.add(batch)
         progress(len(batch))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.show.detection import BIN_DEG, MAX_CELLS
-from generator.plan.poses import PosePlan
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,10 +19,10 @@ class PoseCells:
     binned: bool
 
     @classmethod
-    def of(cls, plan: PosePlan) -> PoseCells:
+    def of(cls, poses: DatasetPoses) -> PoseCells:
         """The grid's own values; cells of 10° where poses are off the grid or the grid is too fine."""
-        angles = plan.angles_deg
-        binned = bool((plan.indices < 0).any()) or max(len(np.unique(axis)) for axis in angles.T) > MAX_CELLS
+        angles, _ = poses.flat_angles()
+        binned = not poses.on_grid or max(len(np.unique(axis)) for axis in angles.T) > MAX_CELLS
         if binned:
             angles = _round(angles)
         yaw, pitch, roll = (np.unique(axis) for axis in angles.T)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.export.sample import exact_pixels
 from generator.dataset.format.open import as_array
-from generator.dataset.show.report.regions import REGIONS
+from generator.dataset.format.row_cameras import RowCameras
 from generator.geometry.rigid import fit_similarity
 from generator.geometry.rotation import angles_from_rotation, geodesic_deg
+from generator.landmarks.topology import Topology
 
 ENOUGH = 30
 """Anchored points below which a row is not compared: a fit to fewer says little."""
@@ -28,8 +28,8 @@ class RowErrors:
     pose_deg     float64 [K, 3]: yaw, pitch, roll of the detector minus the exact ones
     geodesic_deg float64 [K]: angle between the detector's rotation and the exact one
     mm_per_px    float64 [K], at the depth of the pivot
-    distance_px  float64 [K, 468]: of each point, NaN without an anchor
-    shift_head   float64 [K, 468, 3]: the error with the pose undone, pixels, the mean of its depth removed
+    distance_px  float64 [K, P]: of each point, NaN without an anchor
+    shift_head   float64 [K, P, 3]: the error with the pose undone, pixels, the mean of its depth removed
     """
 
     rows: np.ndarray
@@ -41,7 +41,7 @@ class RowErrors:
     shift_head: np.ndarray
 
 
-def row_errors(batch: pa.RecordBatch) -> RowErrors:
+def row_errors(batch: pa.RecordBatch, topology: Topology) -> RowErrors:
     """Compare the detector with the mesh on every row of a batch that has both.
 
     The pose error is that of a rigid fit (Umeyama) of the exact landmarks, as the camera
@@ -50,29 +50,25 @@ def row_errors(batch: pa.RecordBatch) -> RowErrors:
     exact_mm = as_array(batch, "landmarks_exact")
     anchored = np.isfinite(exact_mm).all(axis=2)
     rows = np.flatnonzero(as_array(batch, "detected").astype(bool) & (anchored.sum(axis=1) >= ENOUGH))
-    camera = as_array(batch, "camera").reshape(-1, 3, 3)[rows]
-    translation = as_array(batch, "translation_mm")[rows]
-    parallel = np.array(batch.column("projection").to_pylist())[rows] == "orthographic"
-    exact = np.empty((len(rows), *exact_mm.shape[1:]))
-    for some, name in ((~parallel, "perspective"), (parallel, "orthographic")):
-        exact[some] = exact_pixels(exact_mm[rows[some]], camera[some], translation[some], name)
+    cameras = RowCameras.of(batch)[rows]
+    exact = cameras.pixels(exact_mm[rows])
     found = as_array(batch, "landmarks")[rows].astype(np.float64)
     rotation = as_array(batch, "rotation")[rows].reshape(-1, 3, 3)
 
     error = found - exact
     flat = error[..., :2]
     distance = np.linalg.norm(flat, axis=-1)
-    region = np.stack([_means(flat[:, points], distance[:, points]) for points in REGIONS.values()], axis=1)
+    means = [_means(flat[:, points], distance[:, points]) for points in topology.regions.values()]
     seen = _fitted_rotations(exact, found, anchored[rows]) @ rotation
     # The origin of the detector's depth is its own; without this it would leak into x and y below.
     error[..., 2] -= np.nanmean(error[..., 2], axis=1, keepdims=True)
     turn = angles_from_rotation(seen) - angles_from_rotation(rotation)
     return RowErrors(
         rows=rows,
-        region=region,
+        region=np.stack(means, axis=1),
         pose_deg=(turn + 180) % 360 - 180,
         geodesic_deg=geodesic_deg(rotation, seen),
-        mm_per_px=translation[:, 2] / camera[:, 0, 0],
+        mm_per_px=cameras.translation_mm[:, 2] / cameras.matrix[:, 0, 0],
         distance_px=distance,
         shift_head=error @ rotation,
     )

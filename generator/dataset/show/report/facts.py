@@ -12,7 +12,6 @@ from typing import Any
 
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest
-from generator.dataset.format.schema import LANDMARKS
 from generator.dataset.show.report.atlas import Atlas
 
 LOG_FILE = "build.log"
@@ -33,7 +32,7 @@ def head_facts(
             "attribution": head.attribution,
             "problems": list(head.problems),
             "frame": head.frame,
-            "anchors": LANDMARKS - head.anchor_absent,
+            "anchors": atlas.topology.count - head.anchor_absent,
             "anchor_residual_mm": _number(head.anchor_residual_mm),
             "src": picture,
             **atlas.of_head(head.subject, head.expression),
@@ -75,10 +74,11 @@ def why_no_atlas(heads: Sequence[HeadRow], atlas: Atlas) -> str:
     """Why there is nothing to compare the detector with; "" if there is."""
     if atlas.overall["compared"]:
         return ""
-    if all(head.anchor_absent == LANDMARKS for head in heads):
+    if all(head.anchor_absent == atlas.topology.count for head in heads):
         return (
             "No head of this dataset has exact landmarks: no face was found on its front, so nothing could "
-            "be anchored to its mesh. The error of the detector cannot be said."
+            "be anchored to its mesh, or it was made before they were recorded (schema 1.0). The error of "
+            "the detector cannot be said."
         )
     return "The detector found no face on any head that has exact landmarks, so there is nothing to compare."
 

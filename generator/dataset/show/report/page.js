@@ -269,12 +269,12 @@
       $("overlays").remove();
       return;
     }
-    $("sheet-note").textContent = `${sheet.heads.length} of ${whole(data.heads_count)} heads, ${sheet.poses.length} of ` +
-      `${whole(data.poses)} poses (yaw, pitch, roll), with the outlines of eyes, brows, nose, mouth and face.`;
+    $("sheet-note").textContent = `${sheet.heads.length} of ${whole(data.heads_count)} heads, ${sheet.columns} of ` +
+      `${whole(data.poses)} poses (yaw, pitch, roll${sheet.poses.length ? "" : "; every head has its own"}), with the outlines of eyes, brows, nose, mouth and face.`;
     const grid = $("sheet");
-    grid.style.gridTemplateColumns = `minmax(74px, 110px) repeat(${sheet.poses.length}, 1fr)`;
-    grid.append(make("span"), ...sheet.poses.map((pose) =>
-      make("span", { class: "pose", text: pose.map(degrees).join(" ") })));
+    grid.style.gridTemplateColumns = `minmax(74px, 110px) repeat(${sheet.columns}, 1fr)`;
+    const titles = sheet.poses.length ? sheet.poses.map((pose) => pose.map(degrees).join(" ")) : Array(sheet.columns).fill("");
+    grid.append(make("span"), ...titles.map((text) => make("span", { class: "pose", text })));
     const dots = (points, kind) => {
       const group = shape("g", { class: `dots-${kind}` });
       for (let k = 0; k < points.length; k += 2) group.append(shape("circle", { cx: points[k], cy: points[k + 1], r: 7 }));
@@ -282,16 +282,18 @@
     };
     sheet.heads.forEach((head, h) => {
       grid.append(make("span", { class: "name", text: head.subject }, make("small", { text: head.expression })));
-      sheet.tiles[h].forEach((tile, t) => {
+      sheet.tiles[h].forEach((tile) => {
         const box = make("figure", { class: "tile" });
         if (tile) {
           const svg = shape("svg", { viewBox: "0 0 1000 1000", "aria-hidden": "true" });
           svg.append(dots(tile.exact, "exact"), dots(tile.found, "found"));
-          box.append(make("img", { src: tile.src, alt: `${head.subject} at ${sheet.poses[t].map(degrees).join(", ")}` }), svg);
+          box.append(make("img", { src: tile.src, alt: `${head.subject} at ${tile.pose.map(degrees).join(", ")}` }), svg);
+          if (!sheet.poses.length) box.title = tile.pose.map(degrees).join(" ");
           if (!tile.detected) box.append(make("figcaption", { class: "missed", text: "not detected" }));
         }
         grid.append(box);
       });
+      for (let k = sheet.tiles[h].length; k < sheet.columns; k++) grid.append(make("span"));
     });
     for (const kind of ["exact", "found"]) {
       $(`show-${kind}`).addEventListener("change", (e) => grid.classList.toggle(`hide-${kind}`, !e.target.checked));

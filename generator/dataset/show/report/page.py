@@ -9,14 +9,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from generator.dataset.format.dataset_poses import read_dataset_poses
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import read_heads
-from generator.dataset.format.manifest import POSES_FILE, read_manifest
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.format.open import dataset_topology
 from generator.dataset.show.report.atlas import collect_atlas
 from generator.dataset.show.report.cells import PoseCells
 from generator.dataset.show.report.facts import build_facts, head_facts, why_no_atlas
 from generator.dataset.show.report.tiles import contact_sheet, thumbnails
-from generator.plan.poses import csv_plan
 
 
 def write_report(root: Path, page: Path, progress: Callable[[int], None] | None = None) -> int:
@@ -37,21 +38,22 @@ def write_report(root: Path, page: Path, progress: Callable[[int], None] | None 
 def report_data(root: Path, progress: Callable[[int], None]) -> dict[str, Any]:
     """What the page shows, as plain values. Raises DatasetError as :func:`write_report` does."""
     manifest, heads = read_manifest(root), read_heads(root)
-    plan = csv_plan(root / POSES_FILE)
-    cells = PoseCells.of(plan)
-    atlas = collect_atlas(root, manifest, heads, cells, progress)
+    poses = read_dataset_poses(root, heads)
+    cells = PoseCells.of(poses)
+    topology = dataset_topology(root, manifest)
+    atlas = collect_atlas(root, manifest, heads, cells, progress, topology)
     return {
         "rows": manifest.rows,
         "detected": manifest.detected_rows,
         "heads_count": manifest.heads,
         "publishable": sum(head.redistributable for head in heads),
-        "poses": len(plan),
+        "poses": poses.most,
         "images": manifest.images,
         "overall": atlas.overall,
         "why_no_atlas": why_no_atlas(heads, atlas),
         **atlas.as_dict(),
-        "sheet": contact_sheet(root, manifest, heads, plan),
-        "heads": head_facts(heads, thumbnails(root, manifest, heads, plan), atlas),
+        "sheet": contact_sheet(root, manifest, heads, poses, topology),
+        "heads": head_facts(heads, thumbnails(root, manifest, heads, poses), atlas),
         "build": build_facts(root, manifest),
     }
 

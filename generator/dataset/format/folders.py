@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A dataset's folder beside another one: complete or not there, its large files shared where they can be."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from generator.errors import DatasetError
+
+
+@contextmanager
+def folder_beside(source: Path, target: Path) -> Iterator[Path]:
+    """A hidden folder that takes the name target when the block ends without an error.
+
+    Raises DatasetError: target exists or lies inside of source, or it cannot be written;
+    nothing is left behind.
+    """
+    if target.exists():
+        raise DatasetError(f"{target} exists; choose another --out")
+    if source in target.parents:
+        raise DatasetError(f"{target} lies inside of {source}; choose another --out")
+    work = target.with_name(f".{target.name}.tmp")
+    shutil.rmtree(work, ignore_errors=True)
+    try:
+        work.mkdir(parents=True)
+        yield work
+        work.rename(target)
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror}); free some disk space or check the permissions"
+        raise DatasetError(f"{target}: {reason}") from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def share_files(source: Path, target: Path, without: Collection[str]) -> None:
+    """Give target what lies in source, besides the named files and what is hidden.
+
+    Folders hold files that are never changed in place: they are linked, or copied where the disk has no
+    links. Files beside them may grow, such as logs: they are copied. Raises OSError.
+    """
+    for path in sorted(source.iterdir()):
+        if path.name in without or path.name.startswith("."):
+            continue
+        if path.is_dir():
+            shutil.copytree(path, target / path.name, copy_function=_link_file)
+        else:
+            shutil.copy2(path, target / path.name)
+
+
+def _link_file(path: str, target: str) -> None:
+    try:
+        os.link(path, target)
+    except OSError:
+        shutil.copy2(path, target)

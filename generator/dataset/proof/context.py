@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the rows of a dataset are compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from generator.dataset.format.columns import ImageMode
+from generator.dataset.format.dataset_poses import DatasetPoses
+from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.schema import is_newer
+from generator.errors import DatasetError, UsageError
+from generator.geometry.camera import Camera
+from generator.plan.config import recorded_config
+from generator.plan.settings import known_values
+from generator.plan.view_plan import plan_views
+from generator.plan.views import Views
+
+HEADS_AT_HAND = 8
+"""Heads whose views are kept: the parts of a head lie together."""
+
+ExpectedCamera = Callable[[int, int], Camera]
+"""(place in heads.parquet, place in the head's plan) -> the camera that row has to have."""
+
+
+def planned_cameras(
+    heads: Sequence[HeadRow], poses: DatasetPoses, manifest: Manifest, root: Path
+) -> ExpectedCamera:
+    """The cameras that the recorded configuration plans for heads of the recorded sizes.
+
+    Neither heads.parquet nor the rows are asked: their cameras are what is to be proved.
+    Raises DatasetError if the configuration is none.
+    """
+    configuration = manifest.configuration
+    if is_newer(manifest.schema_version):  # it may have settings that we do not know
+        configuration = known_values(configuration)
+    try:
+        config = recorded_config(configuration, root)
+    except UsageError as error:
+        raise DatasetError(
+            f"manifest.json: its configuration cannot be read ({error}); run `headturn build` again"
+        ) from error
+
+    @lru_cache(maxsize=HEADS_AT_HAND)
+    def views(head: int) -> Views:
+        row = heads[head]
+        angles = poses.plan(head).angles_deg.tolist()
+        return plan_views(config, f"{row.subject}/{row.expression}", row.radius_mm, [*map(tuple, angles)])
+
+    return lambda head, pose: views(head)[pose].camera
+
+
+@dataclass(frozen=True, eq=False)
+class RowContext:
+    """Of one batch of a part.
+
+    split: the folder the part lies in. heads, poses: the tables.
+    anchors: float64 [heads, P, 3], at pose zero, frame C, mm; NaN where there is none.
+    head_index, pose_index: int [N], the place of each row of the batch in heads and its plan, none below 0.
+    measured: the largest values that checks came across, by name.
+    """
+
+    root: Path
+    images: ImageMode
+    heads: Sequence[HeadRow]
+    poses: DatasetPoses
+    anchors: np.ndarray
+    expected_camera: ExpectedCamera
+    split: str = ""
+    head_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    pose_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    measured: dict[str, float] = field(default_factory=dict)
+
+    def note(self, name: str, value: float) -> None:
+        """Remember a value if it is the largest of its name so far."""
+        self.measured[name] = max(value, self.measured.get(name, value))
