@@ -31,6 +31,7 @@ from generator.dataset.show.format_tables import (  # noqa: E402
     passes_table,
     rotations_table,
 )
+from generator.plan.settings import SECTIONS  # noqa: E402
 
 
 def _section(name: str) -> Callable[[], str]:
