@@ -22,7 +22,7 @@ from scipy.optimize import linear_sum_assignment
 
 from generator.dataset.format.anchors_table import read_anchors
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, graphics_rotation, rotation_from_angles
-from generator.landmarks.detector import LEFT_EYE_OUTER, POINTS, RIGHT_EYE_OUTER
+from generator.landmarks.topology import FACE_MESH
 
 TARGET = Path(__file__).resolve().parents[1] / "generator" / "landmarks"
 EYE_DISTANCE_MM = 90.0
@@ -47,7 +47,7 @@ def measured_faces() -> tuple[np.ndarray, np.ndarray]:
         anchors = [a.points for a in read_anchors(Path(folder) / "d").values()]
     seen = table.filter(table["detected"])
     rotations = np.stack(seen["rotation"].to_numpy()).reshape(-1, 3, 3)
-    landmarks = np.stack(seen["landmarks"].to_numpy()).reshape(-1, POINTS, 3).astype(np.float64)
+    landmarks = np.stack(seen["landmarks"].to_numpy()).reshape(-1, FACE_MESH.count, 3).astype(np.float64)
     return landmarks @ rotations @ CAMERA_FROM_GRAPHICS, np.stack(anchors) @ CAMERA_FROM_GRAPHICS
 
 
@@ -75,10 +75,10 @@ def write(name: str, faces: np.ndarray, pairs: np.ndarray | None) -> np.ndarray:
     pairs = mirror_pairs(face) if pairs is None else pairs
     face -= face.mean(0)
     face = (face + face[pairs] * [-1.0, 1.0, 1.0]) / 2
-    face *= EYE_DISTANCE_MM / np.linalg.norm(face[LEFT_EYE_OUTER] - face[RIGHT_EYE_OUTER])
+    face *= EYE_DISTANCE_MM / np.linalg.norm(face[FACE_MESH.left_eye_outer] - face[FACE_MESH.right_eye_outer])
     level = graphics_rotation(rotation_from_angles(np.array([0.0, LEVEL_PITCH_DEG, 0.0])))
     face = (face - face.mean(0)) @ level.T
-    header = "x,y,z of the 468 points in mm, frame U; made by scripts/make_reference_face.py"
+    header = "x,y,z of the points in mm, frame U; made by scripts/make_reference_face.py"
     np.savetxt(TARGET / name, face, fmt="%.2f", delimiter=",", header=header)
     print(f"{name}: {len(face)} points, {np.ptp(face, axis=0).round(1)} mm")
     return pairs

@@ -115,26 +115,6 @@ def framing_distance(
     return margin * radius_mm / reach
 
 
-def project_with(matrix: np.ndarray, points_mm: np.ndarray, pivot_depth_mm: np.ndarray) -> np.ndarray:
-    """Pixels of points of many rows from their K alone.
-
-    Parameters
-    ----------
-    matrix: float [N, 3, 3]. points_mm: float [N, P, 3], frame C.
-    pivot_depth_mm: float [N], t_z of orthographic rows, NaN where the row is perspective.
-
-    Returns
-    -------
-    float64 [N, P, 2].
-    """
-    points = np.asarray(points_mm, dtype=np.float64)
-    pivot = np.asarray(pivot_depth_mm, dtype=np.float64)[:, None, None]
-    depth = np.where(np.isnan(pivot), points[..., 2:], pivot)
-    ones = np.ones_like(points[..., :1])
-    image = np.concatenate([points[..., :2] / depth, ones], axis=-1) @ np.swapaxes(matrix, -1, -2)
-    return image[..., :2]
-
-
 def isotropic_pixels(
     points_mm: np.ndarray, matrix: np.ndarray, translation_mm: np.ndarray, projection: Sequence[str]
 ) -> np.ndarray:

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.geometry.rigid import fit_similarity
-from generator.landmarks.detector import POINTS
-from generator.landmarks.reference_face import mirror_pairs
+from generator.landmarks.topology import Topology
 
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """The 468 landmarks on one mesh.
+    """The landmarks of a topology on one mesh; P of them.
 
-    triangles    int32 [468], -1 where there is no anchor
-    weights      float64 [468, 3], barycentric; NaN where there is none
-    points       float64 [468, 3], frame C at pose zero of the mesh's own axes, mm; NaN where
+    triangles    int32 [P], -1 where there is no anchor
+    weights      float64 [P, 3], barycentric; NaN where there is none
+    points       float64 [P, 3], frame C at pose zero of the mesh's own axes, mm; NaN where
                  there is none
     views        detections averaged
     off          anchors whose landmark fell beside the silhouette in most views, or past it onto
@@ -48,10 +47,9 @@ class Anchors:
             return ["no face was found near the front: landmarks_exact is NaN"]
         return [f"{self.absent} landmarks have no place on the mesh: NaN"] if self.absent else []
 
-    @property
-    def asymmetry_mm(self) -> float:
+    def asymmetry_mm(self, topology: Topology) -> float:
         """Rms distance of each anchor from the mirror image of its partner, after a rigid fit."""
-        pairs = mirror_pairs()
+        pairs = topology.mirror_pairs()
         mirrored = self.points[pairs] * [-1.0, 1.0, 1.0]
         both = np.isfinite(self.points + mirrored).all(axis=1)
         if both.sum() < 3:
@@ -59,11 +57,11 @@ class Anchors:
         return fit_similarity(mirrored[both], self.points[both]).rms
 
     def turned(self, rotation: np.ndarray) -> np.ndarray:
-        """The points after a rotation of the head, float64 [468, 3]. rotation: R_C [3, 3]."""
+        """The points after a rotation of the head, float64 [P, 3]. rotation: R_C [3, 3]."""
         return self.points @ np.asarray(rotation).T
 
 
-def no_anchors() -> Anchors:
+def no_anchors(topology: Topology) -> Anchors:
     """Anchors of a head on which no face was found."""
-    nothing = np.full((POINTS, 3), np.nan)
-    return Anchors(np.full(POINTS, -1, dtype=np.int32), nothing, nothing)
+    nothing = np.full((topology.count, 3), np.nan)
+    return Anchors(np.full(topology.count, -1, dtype=np.int32), nothing, nothing)

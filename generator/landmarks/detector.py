@@ -8,13 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from generator import registries
-from generator.landmarks.topology import FACE_MESH, Topology
+from generator.landmarks.topology import Topology
 from generator.plan.settings import Landmarks
-
-# Face Mesh's, by their short names. Code that may meet another detector takes them from its topology.
-TOPOLOGY, POINTS = FACE_MESH.name, FACE_MESH.count
-RIGHT_EYE_OUTER, LEFT_EYE_OUTER = FACE_MESH.right_eye_outer, FACE_MESH.left_eye_outer
-CHIN, NOSE_TIP = FACE_MESH.chin, FACE_MESH.nose_tip
 
 
 class Detector(Protocol):

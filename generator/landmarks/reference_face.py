@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pose that landmarks tell by themselves, and Face Mesh's mean faces by their short names."""
+"""The pose that landmarks tell by themselves."""
 
 from __future__ import annotations
 
@@ -8,10 +8,6 @@ import numpy as np
 from generator.geometry.rigid import Similarity, fit_similarity
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
 from generator.landmarks.topology import FACE_MESH, Topology
-
-reference_face = FACE_MESH.reference_face
-surface_face = FACE_MESH.surface_face
-mirror_pairs = FACE_MESH.mirror_pairs
 
 
 def fit_pose(landmarks: np.ndarray, topology: Topology = FACE_MESH) -> Similarity:

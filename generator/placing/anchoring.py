@@ -17,7 +17,6 @@ from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors, no_anchors
 from generator.landmarks.detector import Detector
-from generator.landmarks.reference_face import mirror_pairs
 from generator.landmarks.surface import Surface
 from generator.placing.anchors import Sighting, cast_views, find_anchors
 from generator.placing.levelling import Levelling, level
@@ -53,7 +52,7 @@ def anchor_views(
     """
     package = scratch / "anchor.npz"
     save_package(mesh, package)
-    pairs = mirror_pairs()
+    pairs = detector.topology.mirror_pairs()
     sightings = []
     views = Views(POSES, (camera,), (LOOK,))
     for angles, path in zip(POSES, renderer.render(package, views), strict=True):
@@ -83,10 +82,10 @@ def anchor_head(
     camera = anchor_camera(placement.eye_distance_mm)
     views = anchor_views(placed, camera, renderer, detector, scratch)
     if not views:
-        return no_anchors(), None
+        return no_anchors(detector.topology), None
     surface = Surface(placed)
-    anchors = find_anchors(surface, views, camera)
-    return anchors, level(anchors.points, cast_views(surface, views, camera))
+    anchors = find_anchors(surface, views, camera, detector.topology)
+    return anchors, level(anchors.points, cast_views(surface, views, camera), detector.topology)
 
 
 def level_head(head: Head, placement: Placement, levelling: Levelling | None, frame: str) -> Placement:

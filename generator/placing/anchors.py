@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +18,10 @@ from generator.geometry.camera import Camera
 from generator.geometry.rigid import fit_similarity
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
 from generator.landmarks.anchors import Anchors
-from generator.landmarks.reference_face import surface_face
-from generator.landmarks.surface import Surface
+from generator.landmarks.topology import Topology
+
+if TYPE_CHECKING:
+    from generator.landmarks.surface import Surface
 
 MAX_OFF_MM = 15.0
 """A landmark farther beside the silhouette than this has no place on the mesh."""
@@ -33,7 +36,7 @@ farther than this, and otherwise to the nearest point."""
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """One detection. rotation: R_C [3, 3]. pixels: float [468, 2]."""
+    """One detection. rotation: R_C [3, 3]. pixels: float [P, 2]."""
 
     rotation: np.ndarray
     pixels: np.ndarray
@@ -48,7 +51,7 @@ def _rounded(weights: np.ndarray, decimals: int) -> np.ndarray:
     return rounded
 
 
-def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera) -> Anchors:
+def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera, topology: Topology) -> Anchors:
     """Cast every view's landmarks onto the surface and average them there.
 
     views: at least one, of the surface seen by camera. Points whose rays miss the surface use
@@ -56,7 +59,7 @@ def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera) ->
     """
     hits, missed = zip(*(_cast(surface, view, camera) for view in views), strict=True)
     found, beside = np.stack(hits), np.stack(missed)
-    centre, astray = _brought_back(_robust_mean(found))
+    centre, astray = _brought_back(_robust_mean(found), topology)
     triangles, weights = _onto(surface, centre)
     absent = np.isnan(centre).any(axis=1)
     triangles[absent], weights[absent] = -1, np.nan
@@ -79,7 +82,7 @@ def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera) ->
 
 
 def cast_views(surface: Surface, views: Sequence[Sighting], camera: Camera) -> np.ndarray:
-    """Each view's own landmarks on the surface, float64 [views, 468, 3], frame C at pose zero."""
+    """Each view's own landmarks on the surface, float64 [views, P, 3], frame C at pose zero."""
     return np.stack([_cast(surface, view, camera)[0] for view in views])
 
 
@@ -115,15 +118,15 @@ def _robust_mean(points: np.ndarray) -> np.ndarray:
     return result
 
 
-def _brought_back(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _brought_back(points: np.ndarray, topology: Topology) -> tuple[np.ndarray, np.ndarray]:
     """Points far from any face moved to their place in the mean face, and which they were.
 
-    A ray that passes the jaw by a hair's breadth meets the hair behind it. [468, 3] -> the same, bool [468].
+    A ray that passes the jaw by a hair's breadth meets the hair behind it. [P, 3] -> the same, bool [P].
     """
     known = np.isfinite(points).all(axis=1)
     if known.sum() < 3:
         return points, np.zeros(len(points), dtype=bool)
-    reference = surface_face() @ CAMERA_FROM_GRAPHICS
+    reference = topology.surface_face() @ CAMERA_FROM_GRAPHICS
     fit = fit_similarity(reference[known], points[known])
     expected = fit.scale * reference @ fit.rotation.T + fit.translation
     astray = known & (np.linalg.norm(points - expected, axis=1) > MAX_ASTRAY_MM * fit.scale)

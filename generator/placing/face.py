@@ -23,7 +23,8 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.units import CANDIDATE_AXES, MM_PER_UNIT, axes_rotation, guess_units
-from generator.landmarks.detector import CHIN, LEFT_EYE_OUTER, NOSE_TIP, RIGHT_EYE_OUTER, Detector
+from generator.landmarks.detector import Detector
+from generator.landmarks.topology import Topology
 from generator.placing.rendering import HeadRenderer, read_image
 from generator.plan.settings import Look
 from generator.plan.views import View, Views
@@ -157,22 +158,23 @@ def _look(
     save_package(seen, package)
     [path] = renderer.render(package, Views.of([View((0.0, 0.0, 0.0), camera, _LOOK)]))
     landmarks = detector.detect(read_image(path))
-    if landmarks is None or not _is_frontal(landmarks):
+    if landmarks is None or not _is_frontal(landmarks, detector.topology):
         return None
-    pixels = landmarks[[RIGHT_EYE_OUTER, LEFT_EYE_OUTER, CHIN], :2]
+    points = detector.topology
+    pixels = landmarks[[points.right_eye_outer, points.left_eye_outer, points.chin], :2]
     origins, rays = camera.rays(pixels)
     vertices = seen.vertices @ CAMERA_FROM_GRAPHICS + camera.translation_mm
     hits = first_hits(origins, rays, vertices, mesh.triangles)
     if np.isnan(hits).any():
         return None
-    points = (hits - camera.translation_mm) @ CAMERA_FROM_GRAPHICS / mm + centre
-    return _Face(*points)
+    found = (hits - camera.translation_mm) @ CAMERA_FROM_GRAPHICS / mm + centre
+    return _Face(*found)
 
 
-def _is_frontal(landmarks: np.ndarray) -> bool:
-    right, left = landmarks[RIGHT_EYE_OUTER], landmarks[LEFT_EYE_OUTER]
-    across, down = left - right, landmarks[CHIN] - (left + right) / 2
-    nose = landmarks[NOSE_TIP] - (left + right) / 2
+def _is_frontal(landmarks: np.ndarray, points: Topology) -> bool:
+    right, left = landmarks[points.right_eye_outer], landmarks[points.left_eye_outer]
+    across, down = left - right, landmarks[points.chin] - (left + right) / 2
+    nose = landmarks[points.nose_tip] - (left + right) / 2
     aligned = np.cos(np.deg2rad(MAX_TILT_DEG))
     return bool(
         across[0] > aligned * np.linalg.norm(across)

@@ -9,10 +9,10 @@ import numpy as np
 
 from generator.geometry.rigid import fit_similarity
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, angles_from_rotation, graphics_rotation
-from generator.landmarks.reference_face import surface_face
+from generator.landmarks.topology import Topology
 
-FEWEST_POINTS = 200
-"""Fewer anchors than this are no face to level."""
+FEWEST_SHARE = 0.427
+"""Of a topology's points: fewer anchors are no face to level. 200 of Face Mesh's."""
 
 SHAPE_SD_DEG = (0.3, 3.2, 0.1)
 """Standard deviation of yaw, pitch and roll of this fit over the 24 heads of
@@ -32,24 +32,24 @@ class Levelling:
     sd_deg: np.ndarray
 
 
-def level(points: np.ndarray, views: np.ndarray) -> Levelling | None:
+def level(points: np.ndarray, views: np.ndarray, topology: Topology) -> Levelling | None:
     """Rigid alignment of a neutral head's anchors to the reference face; None with too few of them.
 
     Parameters
     ----------
-    points: float [468, 3], anchors, frame C, NaN where absent.
-    views: float [V, 468, 3], the same from each view alone.
+    points: float [P, 3], anchors, frame C, NaN where absent.
+    views: float [V, P, 3], the same from each view alone.
     """
-    rotation = _rotation(points)
+    rotation = _rotation(points, topology)
     if rotation is None:
         return None
-    single = [angles_from_rotation(r) for view in views if (r := _rotation(view)) is not None]
+    single = [angles_from_rotation(r) for view in views if (r := _rotation(view, topology)) is not None]
     noise = np.var(single, axis=0, ddof=1) / len(single) if len(single) > 1 else np.zeros(3)
     return Levelling(graphics_rotation(rotation.T), np.sqrt(noise + np.square(SHAPE_SD_DEG)))
 
 
-def _rotation(points: np.ndarray) -> np.ndarray | None:
+def _rotation(points: np.ndarray, topology: Topology) -> np.ndarray | None:
     known = np.isfinite(points).all(axis=1)
-    if known.sum() < FEWEST_POINTS:
+    if known.sum() < FEWEST_SHARE * topology.count:
         return None
-    return fit_similarity((surface_face() @ CAMERA_FROM_GRAPHICS)[known], points[known]).rotation
+    return fit_similarity((topology.surface_face() @ CAMERA_FROM_GRAPHICS)[known], points[known]).rotation

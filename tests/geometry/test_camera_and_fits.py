@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.geometry.camera import Camera, Projection, framing_distance, project_with
+from generator.geometry.camera import Camera, Projection, framing_distance, isotropic_pixels
 from generator.geometry.raycast import first_hits
 from generator.geometry.rigid import fit_rotations, fit_similarity
 from generator.geometry.rotation import rotation_from_angles
@@ -30,10 +30,11 @@ def test_orthographic_rays_are_parallel_and_agree_with_perspective_at_the_pivot(
     assert np.allclose(flat.project(points), deep.project(points))
     assert np.allclose(flat.project([flat.view_mm / 2, 0, 123.0]), [256, 128])
     for camera in (flat, deep):
-        pivot = np.array([np.nan if camera is deep else 700.0])
         moved = points + np.array([0, 0, 5.0])
-        ours = project_with(camera.matrix[None], moved[None], pivot)
-        assert np.allclose(ours[0], camera.project(moved))
+        ours = isotropic_pixels(
+            moved[None], camera.matrix[None], camera.translation_mm[None], [camera.projection]
+        )
+        assert np.allclose(ours[0, :, :2], camera.project(moved))
 
 
 def test_the_pivot_is_the_centre_of_the_image() -> None:

@@ -23,8 +23,8 @@ from generator.geometry.rotation import (
 )
 from generator.heads.mesh import HeadMesh, Material
 from generator.landmarks.anchors import Anchors, no_anchors
-from generator.landmarks.reference_face import mirror_pairs, surface_face
 from generator.landmarks.surface import TOLERANCE_MM, Surface
+from generator.landmarks.topology import FACE_MESH
 from generator.placing.anchors import Sighting, find_anchors
 from generator.placing.levelling import SHAPE_SD_DEG, level
 from generator.plan.settings import Look
@@ -52,7 +52,7 @@ def ellipsoid() -> HeadMesh:
 @pytest.fixture(scope="module")
 def truth(ellipsoid: HeadMesh) -> np.ndarray:
     """The 468 points of a face on the front of the mesh, frame C."""
-    rays = surface_face() * [0.8, 0.8, 1.0] + [0, 0, 70.0]  # seen from the middle of the head
+    rays = FACE_MESH.surface_face() * [0.8, 0.8, 1.0] + [0, 0, 70.0]  # seen from the middle of the head
     hits = first_hits(np.zeros_like(rays), rays, ellipsoid.vertices, ellipsoid.triangles)
     return hits @ CAMERA_FROM_GRAPHICS
 
@@ -89,7 +89,7 @@ def test_first_hits_are_those_of_the_slow_and_simple_way(ellipsoid: HeadMesh) ->
 def test_anchors_are_exact_without_noise_and_average_it_away(ellipsoid: HeadMesh, truth: np.ndarray) -> None:
     surface = Surface(ellipsoid)
     rng = np.random.default_rng(2)
-    clean = find_anchors(surface, views_of(truth, 0.0, rng), CAMERA)
+    clean = find_anchors(surface, views_of(truth, 0.0, rng), CAMERA, FACE_MESH)
     assert (clean.views, clean.off, clean.absent) == (7, 0, 0)
     always = surface.visible(truth, seen_at(ANGLES, CAMERA)).all(axis=0)
     assert always.sum() > 400
@@ -97,7 +97,7 @@ def test_anchors_are_exact_without_noise_and_average_it_away(ellipsoid: HeadMesh
     assert clean.residual_px < 0.1
     np.testing.assert_allclose(surface.points(clean.triangles, clean.weights), clean.points)
 
-    noisy = find_anchors(surface, views_of(truth, 1.0, rng), CAMERA)
+    noisy = find_anchors(surface, views_of(truth, 1.0, rng), CAMERA, FACE_MESH)
     mm_per_px = CAMERA.view_mm / CAMERA.width
     sideways = (noisy.points - truth)[:, :2] / mm_per_px
     assert np.sqrt((sideways**2).mean()) < 0.6, "seven views: 1 / sqrt(7) = 0.38 px, and a robust mean"
@@ -111,13 +111,13 @@ def test_points_beside_the_silhouette_are_counted_and_too_far_ones_absent(
     for view in views:
         view.pixels[SIDE] = [384 / 2 + 75 / CAMERA.view_mm * 384, 384 / 2]  # 5 mm beside the ellipsoid
         view.pixels[6] = [384 / 2 + 110 / CAMERA.view_mm * 384, 384 / 2]  # 40 mm
-    anchors = find_anchors(Surface(ellipsoid), views, CAMERA)
+    anchors = find_anchors(Surface(ellipsoid), views, CAMERA, FACE_MESH)
     assert (anchors.off, anchors.absent) == (1, 1)
     assert abs(anchors.points[SIDE, 0] - 70) < 2
     assert np.isnan(anchors.points[6]).all()
     assert anchors.triangles[6] == -1
     assert anchors.problems == ["1 landmarks have no place on the mesh: NaN"]
-    assert no_anchors().problems == ["no face was found near the front: landmarks_exact is NaN"]
+    assert no_anchors(FACE_MESH).problems == ["no face was found near the front: landmarks_exact is NaN"]
     back = from_plain(Anchors, to_plain(anchors))
     np.testing.assert_array_equal(back.points, anchors.points)
     np.testing.assert_array_equal(back.triangles, anchors.triangles)
@@ -130,7 +130,7 @@ def test_points_beside_the_silhouette_are_counted_and_too_far_ones_absent(
     views = views_of(truth, 0.0, np.random.default_rng(3))
     for view in views:
         view.pixels[SIDE] = CAMERA.project(view.rotation @ [85.0, 0.0, 60.0] + CAMERA.translation_mm)
-    behind = find_anchors(Surface(wall), views, CAMERA)
+    behind = find_anchors(Surface(wall), views, CAMERA, FACE_MESH)
     assert (behind.off, behind.absent) == (1, 0)
     assert np.linalg.norm(behind.points[SIDE] - truth[SIDE]) < 20, "back on the face, and counted"
     np.testing.assert_array_equal(back.weights, anchors.weights)
@@ -191,22 +191,22 @@ def test_rays_go_through_holes(tmp_path: Path) -> None:
 
 def test_levelling_undoes_a_turned_face() -> None:
     turned = rotation_from_angles(np.array([12.0, -8.0, 5.0]))
-    points = 1.3 * surface_face() @ CAMERA_FROM_GRAPHICS @ turned.T + [1.0, 2.0, 3.0]
-    levelling = level(points, np.stack([points, points]))
+    points = 1.3 * FACE_MESH.surface_face() @ CAMERA_FROM_GRAPHICS @ turned.T + [1.0, 2.0, 3.0]
+    levelling = level(points, np.stack([points, points]), FACE_MESH)
     assert levelling is not None
     assert geodesic_deg(graphics_rotation(levelling.correction), turned.T) < 1e-6
     np.testing.assert_allclose(levelling.sd_deg, SHAPE_SD_DEG)
     lifted = points @ rotation_from_angles(np.array([0.0, 4.0, 0.0])).T
-    shaky = level(points, np.stack([points, lifted] * 2))
+    shaky = level(points, np.stack([points, lifted] * 2), FACE_MESH)
     assert shaky is not None
     assert shaky.sd_deg[1] > levelling.sd_deg[1] + 0.1
     points[200:] = np.nan
     points[199] = np.nan
-    assert level(points, points[None]) is None, "too few points"
+    assert level(points, points[None], FACE_MESH) is None, "too few points"
 
 
 def test_the_surface_face_is_symmetric() -> None:
-    face = surface_face()
-    pairs = mirror_pairs()
+    face = FACE_MESH.surface_face()
+    pairs = FACE_MESH.mirror_pairs()
     np.testing.assert_allclose(face[pairs] * [-1, 1, 1], face, atol=0.011)
     assert np.abs(face.mean(axis=0)).max() < 0.01

@@ -17,7 +17,8 @@ from generator.heads.package import save_package
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
-from generator.landmarks.reference_face import fit_pose, reference_face
+from generator.landmarks.reference_face import fit_pose
+from generator.landmarks.topology import FACE_MESH
 from generator.placing.face import find_face
 from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig
@@ -101,7 +102,7 @@ def test_an_image_without_a_face_is_none(detector: MediaPipeFaceMesh) -> None:
 
 
 def test_the_reference_face_is_symmetric_and_faces_the_viewer() -> None:
-    face = reference_face()
+    face = FACE_MESH.reference_face()
     assert np.abs(face[33] * [-1, 1, 1] - face[263]).max() < 0.05
     assert face[1, 2] > face[:, 2].mean() + 20, "the nose points to +z"
     assert face[152, 1] < face[10, 1], "the chin is below the forehead"

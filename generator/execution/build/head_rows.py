@@ -9,9 +9,10 @@ from pathlib import Path
 from generator.dataset.format.anchors_table import HeadAnchors
 from generator.dataset.format.heads_table import HeadRow
 from generator.execution.build.units import PlannedHead
+from generator.landmarks.topology import Topology
 
 
-def head_row(planned: PlannedHead, mesh_path: str) -> HeadRow:
+def head_row(planned: PlannedHead, mesh_path: str, topology: Topology) -> HeadRow:
     """The row of heads.parquet. mesh_path: relative to the root of its source."""
     head, placement, anchors = planned.head, planned.placement, planned.anchors
     return HeadRow(
@@ -40,7 +41,7 @@ def head_row(planned: PlannedHead, mesh_path: str) -> HeadRow:
         anchor_absent=anchors.absent,
         anchor_residual_px=anchors.residual_px,
         anchor_residual_mm=anchors.residual_mm,
-        anchor_asymmetry_mm=round(anchors.asymmetry_mm, 6),
+        anchor_asymmetry_mm=round(anchors.asymmetry_mm(topology), 6),
         vertices=planned.vertices,
         triangles=planned.triangles,
         split=planned.split,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from generator import __version__
+from generator import __version__, registries
 from generator.dataset.format.anchors_table import write_anchors
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import write_heads
@@ -154,7 +154,10 @@ def _build(
     parts, failures, seconds = run_units(todo, executor, receipts, reporter)
     write_lines(root / FAILURES_FILE, failures)
     recorded = config.moved_to(root)
-    write_heads([head_row(head, relative(head.head.mesh_path, source.path)) for head in planned], root)
+    topology = registries.DETECTORS.get(config.landmarks.detector).topology
+    write_heads(
+        [head_row(head, relative(head.head.mesh_path, source.path), topology) for head in planned], root
+    )
     write_anchors([head_anchors(head) for head in planned], root)
     manifest = Manifest(
         versions=versions,

@@ -153,8 +153,8 @@ class Lane:
             package = self._package(order.head, order.placement)
         with _timed(seconds, "visibility"):
             visible = self._surface.visible(order.anchors, views)
-        points = len(order.anchors)
-        landmarks = np.full((len(views), points, 3), np.nan, dtype=np.float32)
+        topology = detector.topology
+        landmarks = np.full((len(views), topology.count, 3), np.nan, dtype=np.float32)
         detected = np.zeros(len(views), dtype=bool)
         suffix, flags = ENCODING[order.image_format]
         images: list[bytes] = []
@@ -194,10 +194,13 @@ class Lane:
             images=images,
             image_suffix=suffix,
             passes=passes,
+            topology=topology,
         )
         versions = self._versions(order.landmarks)
         with _timed(seconds, "write"):
-            schema = part_schema(cast(ImageMode, order.images), versions, order.configuration_digest)
+            schema = part_schema(
+                cast(ImageMode, order.images), versions, order.configuration_digest, topology
+            )
             part = commit_unit(rows, schema, Path(order.root), order.unit)
         return Built(part, seconds, versions)
 
