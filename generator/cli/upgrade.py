@@ -25,7 +25,11 @@ def upgrade(
     The columns that it lacks hold their defaults, so its digest changes. Rows and labels do not.
     """
     from generator.dataset.format.upgrade import upgrade_dataset
+    from generator.execution.build.lock import LOCK_FILE, locked
 
+    if target is None and (folder / LOCK_FILE).exists():
+        with locked(folder):
+            pass  # or one line, if a build is at work there
     with TerminalReporter(err) as reporter:
         done = upgrade_dataset(folder, target, reporter=reporter)
     now = done.manifest.schema_version

@@ -95,6 +95,11 @@ def stored_version(schema: pa.Schema) -> str:
     return (schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
 
 
+def schema_version_of(schema: pa.Schema) -> str:
+    """The schema version in a part's metadata; "none" where there is none."""
+    return (schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
+
+
 def versions_of(schema: pa.Schema) -> dict[str, str]:
     """Versions of everything that decided the content of a part, from its metadata."""
     versions: dict[str, str] = json.loads((schema.metadata or {}).get(b"headturn.versions", b"{}"))

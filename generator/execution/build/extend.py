@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.part import part_schema_of, read_part, write_part
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import versions_of
+from generator.dataset.format.schema import schema_version_of, versions_of
 from generator.errors import DatasetError
 from generator.execution.build.receipts import Receipts
 from generator.messages import BuildOrder
@@ -44,13 +45,23 @@ def earlier_parts(orders: Sequence[BuildOrder]) -> set[str]:
     return {path for order in orders for path in order.earlier_paths}
 
 
-def recorded_versions(root: Path) -> dict[str, str] | None:
-    """The versions in the first part that can be read; None if there is none."""
+def versions_of_parts(root: Path) -> dict[str, str] | None:
+    """The versions in the first part that can be read; None if there is none.
+
+    Raises DatasetError if it is of another schema: parts of two schemas make no dataset.
+    """
     for path in sorted((root / "data").rglob("part-*.parquet")):
         try:
-            return versions_of(part_schema_of(path))
+            schema = part_schema_of(path)
         except DatasetError:
             continue  # the build will find it damaged and build it again
+        found = schema_version_of(schema)
+        if found != SCHEMA_VERSION:
+            raise DatasetError(
+                f"{root}: its rows are of schema {found}, a build adds rows of {SCHEMA_VERSION}; "
+                f"run `headturn upgrade {root}` first, or choose another --out"
+            )
+        return versions_of(schema)
     return None
 
 

@@ -27,7 +27,7 @@ from generator.dataset.show.card import write_card
 from generator.dataset.show.pictures import anchor_sheet, contact_sheet, detection_map
 from generator.errors import DatasetError
 from generator.execution.build.chunks import chunk_poses
-from generator.execution.build.extend import carry_over, earlier_parts, recorded_versions
+from generator.execution.build.extend import carry_over, earlier_parts, versions_of_parts
 from generator.execution.build.folder import (
     ANCHOR_SHEET_FILE,
     FAILURES_FILE,
@@ -125,6 +125,7 @@ def _build(
 ) -> BuildResult:
     source = find_source(config, root, reporter)
     versions = lane_versions(executor, config.landmarks)
+    recorded_versions = versions_of_parts(root)
     planned, skipped = place_heads(source, config, versions, root, executor, reporter)
     heads = [(head.head.subject, head.head.expression) for head in planned]
     earlier = read_pose_plans(root / POSES_FILE) if (root / POSES_FILE).exists() else None
@@ -136,7 +137,7 @@ def _build(
         root=root,
         configuration_digest=configuration_digest(common_values(config.as_dict())),
         versions=versions,
-        recorded_versions=recorded_versions(root),
+        recorded_versions=recorded_versions,
     )
     receipts = Receipts(root)
     stale = stale_parts(root, orders)
