@@ -12,6 +12,7 @@ from rich.table import Table
 
 from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out
 from generator.cli.reporter import TerminalReporter
+from generator.plan.settings import Heads
 
 heads_app = typer.Typer(help="Make parametric heads, or look at a head source.", no_args_is_help=True)
 
@@ -21,9 +22,11 @@ heads_app = typer.Typer(help="Make parametric heads, or look at a head source.",
 )
 def heads_make(
     folder: Annotated[Path, typer.Option("--out", help="Folder for the heads; must be new or empty.")],
-    count: Annotated[int, typer.Option(help="How many identities.")] = 24,
-    seed: Annotated[int, typer.Option(help="Same seed, same bytes.")] = 0,
-    expressions: Annotated[int, typer.Option(help="Sampled expressions each, besides the neutral face.")] = 0,
+    count: Annotated[int, typer.Option(help="How many identities.")] = Heads.count,
+    seed: Annotated[int, typer.Option(help="Same seed, same bytes.")] = Heads.seed,
+    expressions: Annotated[
+        int, typer.Option(help="Sampled expressions each, besides the neutral face.")
+    ] = Heads.sampled_expressions,
 ) -> None:
     """Compose parametric heads from MakeHuman's CC0 data, as OBJ folders."""
     from generator.heads.parametric.make import make_heads
