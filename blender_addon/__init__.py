@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Headturn in Blender: a side panel, the grid on the timeline, a Build button, a headless command.
 
-Thin adapters around the generator's own scene code and around the host, which
-does everything else; see docs/blender.md. Nothing heavy is imported here:
-numpy and the generator come in with the first click.
+Thin adapters around the generator's own scene code and around the host, which does everything else; see
+docs/blender.md. core/ knows no Blender. Nothing heavy is imported here: numpy and the generator's
+scene code come in with the first click.
 """
 
 from __future__ import annotations
 
-from . import command, operators, panel, preferences, properties, session, timeline
+from . import build_operators, command, handlers, operators, panel, preferences, properties, session
 
-_MODULES = (properties, preferences, operators, panel, timeline, command)
+_MODULES = (properties, preferences, operators, build_operators, panel, handlers, command)
 
 
 def register() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .preferences import host_preference
+from .session import host_preference
 
 _registered: list[Any] = []
 

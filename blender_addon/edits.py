@@ -1,69 +1,101 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What follows when a setting of the scene is edited: update and search functions of properties.py."""
+"""What follows when a setting of the scene is edited: update and search functions of properties.py.
+
+What acts is imported with the first edit: it takes numpy and the generator's scene code.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import bpy
 
-from . import session
+from . import session, windows
+from .session import Shown
 
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
+Update = Callable[[Shown, bpy.types.Context], None]
 
 
-def pose(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+def _unless_quiet(act: Callable[[Shown], None]) -> Update:
+    def update(shown: Shown, context: bpy.types.Context) -> None:
+        if not session.is_quiet():
+            act(shown)
+
+    return update
+
+
+@_unless_quiet
+def pose(shown: Shown) -> None:
     """A slider moved."""
     from . import studio
 
     studio.pose_changed(shown)
 
 
-def look(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def look(shown: Shown) -> None:
     """Camera, light or preset."""
     from . import studio
 
     studio.look_changed(shown.id_data)
 
 
-def plan(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def plan(shown: Shown) -> None:
     """The poses of the dataset."""
     from . import timeline
 
     timeline.plan_changed(shown.id_data)
 
 
-def view(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def detection(shown: Shown) -> None:
+    """How landmarks are found."""
+    from . import landmarks
+
+    landmarks.pose_changed(shown)
+
+
+@_unless_quiet
+def view(shown: Shown) -> None:
     """How the 3D view is shaded."""
     from . import studio
 
     studio.show_views(shown)
 
 
-def overlay(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def overlay(shown: Shown) -> None:
     """What is drawn over the 3D view."""
-    session.redraw_views()
+    windows.redraw_views()
 
 
-def choice(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def choice(shown: Shown) -> None:
     """Which head is shown, or where its pose zero is."""
     from . import heads
 
     heads.show(shown)
 
 
-def source(shown: HeadturnSettings, context: bpy.types.Context) -> None:
+@_unless_quiet
+def source(shown: Shown) -> None:
     """Which heads there are: what was found no longer counts."""
-    if not session.is_quiet():
-        session.state.heads, session.state.skipped, session.state.error = [], [], ""
+    session.state.forget_heads()
 
 
-def subjects(shown: HeadturnSettings, context: bpy.types.Context, text: str) -> list[str]:
+def choose_head(shown: Shown, place: int) -> None:
+    """Show one of the gallery's heads."""
+    from . import heads
+
+    heads.choose(shown, *session.state.heads[place])
+
+
+def subjects(shown: Shown, context: bpy.types.Context, text: str) -> list[str]:
     """For the search of the field."""
     return session.state.subjects()
 
 
-def expressions(shown: HeadturnSettings, context: bpy.types.Context, text: str) -> list[str]:
+def expressions(shown: Shown, context: bpy.types.Context, text: str) -> list[str]:
     """For the search of the field."""
     return session.state.expressions(shown.subject)

@@ -4,102 +4,71 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 
 from . import pictures, session
-
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
-
-AROUND = 50
-"""How many heads before and after the shown one have their picture made: a source may hold thousands."""
+from .core import gallery
+from .core.conversation import OnAnswer, Question
+from .core.state import HeadName
+from .session import Shown
+from .settings import chosen_head, to_config
 
 PIXELS = 128
 _GROUP = "head/"
+Item = tuple[str, str, str, int, int]
 # Blender reads the texts of an enumeration after the function that made them has returned.
-_items: list[tuple[str, str, str, int, int]] = []
+_items: list[Item] = []
 
 
-def fill(shown: HeadturnSettings) -> None:
+def fill(shown: Shown) -> None:
     """Ask for the missing pictures around the shown head, the nearest first."""
     cache = Path(bpy.utils.extension_path_user(__package__, path="thumbnails", create=True))
-    session.ask_later(
-        session.Question(
-            {
-                "op": "thumbnail",
-                "subject": subject,
-                "expression": expression,
-                "frame": shown.frame,
-                "pixels": PIXELS,
-                "cache": str(cache),
-            },
-            _keeper(subject, expression),
+    told = {"op": "thumbnail", "config": to_config(shown), "pixels": PIXELS, "cache": str(cache)}
+    session.conversation.ask_later(
+        Question(
+            {**told, "subject": head[0], "expression": head[1]},
+            _keeper(head),
             lambda reason: None,  # said when that head is chosen
         )
-        for subject, expression in _nearest(shown)
-        if not pictures.kept(_key(subject, expression))
+        for head in gallery.nearest(session.state.heads, chosen_head(shown))
+        if not pictures.kept(_key(head))
     )
 
 
 def forget() -> None:
     """Another source: its heads may have the same names."""
-    session.ask_later(())
+    session.conversation.ask_later(())
     pictures.forget_group(_GROUP)
 
 
-def items(shown: HeadturnSettings, context: bpy.types.Context) -> list[tuple[str, str, str, int, int]]:
+def items(shown: Shown, context: bpy.types.Context) -> list[Item]:
     """The heads around the shown one as an enumeration with pictures, in the source's order."""
     none = bpy.types.UILayout.bl_rna.functions["prop"].parameters["icon"].enum_items["USER"].value
     heads = session.state.heads
-    several = len({expression for _, expression in heads}) > 1
+    titles = gallery.titles(heads)
     _items[:] = [
-        (
-            str(index),
-            f"{heads[index][0]} {heads[index][1]}" if several else heads[index][0],
-            "Show this head",
-            pictures.icon(_key(*heads[index])) or none,
-            index,
-        )
-        for index in _window(shown)
+        (str(place), titles[place], "Show this head", pictures.icon(_key(heads[place])) or none, place)
+        for place in gallery.window(heads, chosen_head(shown))
     ]
     return _items
 
 
-def chosen(shown: HeadturnSettings) -> int:
+def chosen(shown: Shown) -> int:
     """Which of the items is shown."""
-    head = (shown.subject, shown.expression)
-    return session.state.heads.index(head) if head in session.state.heads else 0
+    return gallery.place_of(session.state.heads, chosen_head(shown))
 
 
-def choose(shown: HeadturnSettings, index: int) -> None:
-    """Show one of the items."""
-    from . import heads
-
-    heads.choose(shown, *session.state.heads[index])
+def _key(head: HeadName) -> str:
+    return f"{_GROUP}{'/'.join(head)}"
 
 
-def _key(subject: str, expression: str) -> str:
-    return f"{_GROUP}{subject}/{expression}"
-
-
-def _window(shown: HeadturnSettings) -> range:
-    middle = chosen(shown)
-    return range(max(0, middle - AROUND), min(len(session.state.heads), middle + AROUND + 1))
-
-
-def _nearest(shown: HeadturnSettings) -> list[tuple[str, str]]:
-    middle = chosen(shown)
-    order = sorted(_window(shown), key=lambda index: abs(index - middle))
-    return [session.state.heads[index] for index in order]
-
-
-def _keeper(subject: str, expression: str) -> Any:
+def _keeper(head: HeadName) -> OnAnswer:
     listed = session.state.heads
 
     def take(answer: dict[str, Any]) -> None:
         if session.state.heads is listed:
-            pictures.keep(_key(subject, expression), Path(answer["picture"]))
+            pictures.keep(_key(head), Path(answer["picture"]))
 
     return take

@@ -3,88 +3,63 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 
-from . import gallery, session
+from generator.errors import HeadturnError
 
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
-
-NEUTRAL = "neutral"
-
-
-def cache_folder() -> Path:
-    """Where prepared and parametric heads are kept while Blender runs."""
-    return Path(bpy.app.tempdir or tempfile.gettempdir()) / "headturn"
+from . import gallery, session, settings, studio, timeline
+from .core.tables import section_of
+from .session import Shown
 
 
 def list_heads(scene: bpy.types.Scene) -> None:
     """Ask what the source holds, then show its first head."""
-    from . import settings
-
-    table = settings.to_config(scene.headturn)["heads"]
-    key = "-".join(str(table.get(name)) for name in ("count", "seed", "sampled_expressions"))
+    config = settings.to_config(scene.headturn)
+    heads = section_of(config, "heads")
+    key = f"{heads.count}-{heads.seed}-{heads.sampled_expressions}"
     name = scene.name
 
     def take(answer: dict[str, Any]) -> None:
-        state = session.state
         gallery.forget()
-        state.displayed = None
-        state.kind, state.skipped = answer["kind"], answer["skipped"]
-        state.heads = [(head["subject"], head["expression"]) for head in answer["heads"]]
+        session.state.take_list(answer)
         found = bpy.data.scenes.get(name)
-        if not state.heads:
-            state.error = state.skipped[0] if state.skipped else "this source holds no heads"
-        elif found is not None:
-            choose(found.headturn, state.heads[0][0])
+        if session.state.heads and found is not None:
+            choose(found.headturn, session.state.heads[0][0])
 
-    message = {"op": "list", "heads": table, "cache": str(cache_folder() / f"parametric-{key}")}
+    message = {"op": "list", "config": config, "cache": str(settings.cache_folder() / f"parametric-{key}")}
     session.request(message, "looking for heads...", take)
 
 
-def choose(shown: HeadturnSettings, subject: str, expression: str | None = None) -> None:
+def choose(shown: Shown, subject: str, expression: str | None = None) -> None:
     """Show a head; without an expression the neutral one, or the first."""
-    there = session.state.expressions(subject)
     with session.quiet():
         shown.subject = subject
-        shown.expression = expression or (NEUTRAL if NEUTRAL in there else there[0])
+        shown.expression = expression or session.state.first_of(subject)
     show(shown)
 
 
-def step(shown: HeadturnSettings, what: str, by: int) -> None:
+def step(shown: Shown, what: str, by: int) -> None:
     """Show the next or previous subject or expression, around the end."""
-    state = session.state
-    if what == "SUBJECT":
-        names = state.subjects()
-        choose(shown, _after(names, shown.subject, by))
-    else:
-        names = state.expressions(shown.subject)
-        choose(shown, shown.subject, _after(names, shown.expression, by))
+    choose(shown, *session.state.beside(settings.chosen_head(shown), what, by))
 
 
-def show(shown: HeadturnSettings) -> None:
+def show(shown: Shown) -> None:
     """Have the host place the chosen head, then put it before the camera."""
-    from . import studio
-
     there = session.state.expressions(shown.subject)
-    if session.is_quiet() or not there:
+    if not there:
         return
     if shown.expression not in there:  # another subject was chosen
         choose(shown, shown.subject)
         return
-    subject, expression = shown.subject, shown.expression
-    package = cache_folder() / f"{subject}-{expression}.npz"
+    head = subject, expression = settings.chosen_head(shown)
+    package = settings.cache_folder() / f"{subject}-{expression}.npz"
     name = shown.id_data.name
 
     def take(answer: dict[str, Any]) -> None:
-        from .core.errors import HeadturnError
-
         scene = bpy.data.scenes.get(name)
-        if scene is None or (scene.headturn.subject, scene.headturn.expression) != (subject, expression):
+        if scene is None or settings.chosen_head(scene.headturn) != head:
             return
         if bpy.context.scene == scene:
             scene = studio.studio_scene()
@@ -93,20 +68,16 @@ def show(shown: HeadturnSettings) -> None:
         except (HeadturnError, OSError, RuntimeError) as error:
             session.state.error = " ".join(str(error).split())
             return
-        session.state.notes, session.state.vertices = answer["notes"], answer["vertices"]
-        session.state.displayed = (subject, expression)
+        session.state.take_head(head, answer)
         gallery.fill(scene.headturn)
+        timeline.head_changed(scene)
         bpy.ops.ed.undo_push(message=f"Show {subject}")
 
     message = {
         "op": "place",
+        "config": settings.to_config(shown),
         "subject": subject,
         "expression": expression,
-        "frame": shown.frame,
         "package": str(package),
     }
     session.request(message, f"finding the face of {subject}...", take)
-
-
-def _after(names: list[str], name: str, by: int) -> str:
-    return names[(names.index(name) + by) % len(names)] if name in names else names[0]

@@ -4,21 +4,22 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 
-from . import session
-
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
+from . import session, windows
+from .core.conversation import OnAnswer
+from .session import Shown
+from .settings import chosen_head, pose, radius_mm, to_config
 
 SETTLE_S = 0.15
 _wanted: list[str] = []
 
 
-def pose_changed(shown: HeadturnSettings) -> None:
+def pose_changed(shown: Shown) -> None:
     """The points no longer fit; ask for new ones once the slider rests."""
     session.state.landmarks = None
     if not shown.show_landmarks or bpy.app.background:
@@ -30,38 +31,38 @@ def pose_changed(shown: HeadturnSettings) -> None:
 
 
 def request_pictures(
-    shown: HeadturnSettings, poses: list[tuple[float, ...]], busy: str, on_answer: Any, **more: Any
+    shown: Shown, poses: Sequence[tuple[float, ...]], busy: str, on_answer: OnAnswer, sheet: int = 0
 ) -> None:
-    """Have the host render poses of the head that is shown, as a build would."""
-    from . import settings, studio
+    """Have the host render poses of the head that is shown, as a build would, and find its face.
 
+    sheet: columns of a picture that shows all of them; 0 for none.
+    """
     folder = Path(tempfile.gettempdir()) / f"headturn-pictures-{shown.id_data.name}"
     message = {
         "op": "pictures",
+        "config": to_config(shown),
         "package": shown.package,
-        "render": settings.to_config(shown)["render"],
-        "distance_mm": studio.distance_mm(shown),
+        "head": "/".join(chosen_head(shown)),
+        "radius_mm": radius_mm(shown),
         "poses": [list(angles) for angles in poses],
         "folder": str(folder),
         "landmarks": True,
-        **more,
+        "sheet": sheet,
     }
     session.request(message, busy, on_answer)
 
 
 def _ask() -> float | None:
-    from . import studio
-
-    if session.is_busy():
+    if session.conversation.is_busy:
         return SETTLE_S
     scene = bpy.data.scenes.get(_wanted[0])
     if scene is None or scene.headturn.head is None or not scene.headturn.show_landmarks:
         return None
-    angles = studio.pose(scene.headturn)
+    angles = pose(scene.headturn)
 
     def take(answer: dict[str, Any]) -> None:
         session.state.landmarks = (angles, answer["landmarks"][0])
-        session.redraw_views()
+        windows.redraw_views()
 
     request_pictures(scene.headturn, [angles], "", take)
     return None

@@ -6,12 +6,18 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from mathutils import Vector
 
 from . import session
+from .session import Shown
+from .settings import pose, radius_mm
 
 RED, GREEN, BLUE = (0.95, 0.2, 0.25, 1.0), (0.4, 0.8, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0)
 DOTS = (0.3, 1.0, 0.3, 1.0)
 LINE_WIDTH, DOT_SIZE = 2.5, 3.0
+REACH = 1.25
+"""Length of the axes in radii of the head."""
+
 _handles: list[tuple[Any, str]] = []
 
 
@@ -30,6 +36,13 @@ def remove() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
 
 
+def head_axes(shown: Shown) -> list[Vector]:
+    """End points of the head's frame in Blender's world: pivot, left, up, front."""
+    reach = REACH * radius_mm(shown) / 1000  # Blender's unit is the metre
+    ends = ((0, 0, 0), (reach, 0, 0), (0, 0, reach), (0, -reach, 0))
+    return [shown.head.matrix_world @ Vector(end) for end in ends]
+
+
 def _draw_axes() -> None:
     shown = bpy.context.scene.headturn
     if shown.head is None or not shown.show_axes or not bpy.context.space_data.overlay.show_overlays:
@@ -37,9 +50,7 @@ def _draw_axes() -> None:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    from . import studio
-
-    pivot, *ends = studio.head_axes(shown).tolist()
+    pivot, *ends = head_axes(shown)
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region = bpy.context.region
     shader.uniform_float("viewportSize", (region.width, region.height))
@@ -53,20 +64,18 @@ def _draw_axes() -> None:
 
 
 def _draw_landmarks() -> None:
-    from . import studio
-
     shown, found = bpy.context.scene.headturn, session.state.landmarks
     if shown.head is None or not shown.show_landmarks or found is None:
         return
     angles, points = found
     frame = _camera_frame()
-    if points is None or angles != studio.pose(shown) or frame is None:
+    if points is None or angles != pose(shown) or frame is None:
         return
     import gpu
     from gpu_extras.batch import batch_for_shader
 
     left, bottom, width, height = frame
-    side = shown.resolution
+    side = shown.render_resolution
     places = [(left + x / side * width, bottom + (1 - y / side) * height) for x, y in points]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", DOTS)

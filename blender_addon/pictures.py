@@ -6,6 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+SHEET = "sheet"
+"""Of the outermost poses."""
+
 _collections: list[Any] = []
 
 

@@ -1,75 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What runs beside Blender: the host that was found, its preview server, and what they said.
-
-Nothing here blocks: questions go out, and a timer of 0.1 s, which runs only
-while an answer is due, takes the answers in.
-"""
+"""The one conversation with the host, and its clock: a timer that runs only while an answer is due."""
 
 from __future__ import annotations
 
-import threading
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
+from . import windows
+from .core.conversation import Conversation, Look, OnAnswer, Server
+from .core.state import State
+
 if TYPE_CHECKING:
     from .core.host import Host, HostFacts
-    from .core.process import HostProcess
 
 TICK_S = 0.1
-OnAnswer = Callable[[dict[str, Any]], None]
+"""Seconds between two looks at what the host said."""
 
+Shown = Any
+"""scene.headturn: its properties are made when Blender starts, so no type checker knows them."""
 
-@dataclass(frozen=True)
-class Question:
-    """A line for the preview server, and who takes the answer, or the reason why there is none.
-
-    busy: what the panel says until the answer comes; None if nobody waits for it.
-    """
-
-    message: dict[str, Any]
-    on_answer: OnAnswer
-    on_error: Callable[[str], None]
-    busy: str | None = None
-
-
-@dataclass
-class State:
-    """Shown by the panel; not saved with the file."""
-
-    host: Host | None = None
-    facts: HostFacts | None = None
-    host_error: str = ""
-    checking: bool = False
-    error: str = ""
-    kind: str = ""
-    heads: list[tuple[str, str]] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    vertices: int = 0
-    displayed: tuple[str, str] | None = None
-    extremes: str = ""
-    landmarks: tuple[tuple[float, ...], list[list[float]] | None] | None = None
-
-    def subjects(self) -> list[str]:
-        """Subjects in the source's order."""
-        return list(dict.fromkeys(subject for subject, _ in self.heads))
-
-    def expressions(self, subject: str) -> list[str]:
-        """Expressions of a subject."""
-        return [expression for name, expression in self.heads if name == subject]
-
-
-state = State()
-_server: HostProcess | None = None
-_waiting: deque[Question] = deque()
-_later: deque[Question] = deque()
-_found: deque[Callable[[], None]] = deque()
 _quiet: list[None] = []
 
 
@@ -93,157 +46,81 @@ def request(message: dict[str, Any], busy: str, on_answer: OnAnswer) -> None:
 
     A reason why it cannot is shown in the panel.
     """
-    state.error = ""
-    with_host(lambda: _ask(Question(message, on_answer, _fail, busy)))
+    conversation.request(message, busy, on_answer, _look())
 
 
-def ask_later(questions: Iterable[Question]) -> None:
-    """What to ask, one by one, while nothing else is asked; in place of what was to be asked before."""
-    _later.clear()
-    _later.extend(questions)
-    if _later and state.facts is not None:
-        _start_ticking()
-
-
-def _ask(question: Question) -> None:
-    global _server
-    from .core.errors import HeadturnError
-    from .core.host import host_command
-    from .core.process import HostProcess
-
-    try:
-        if _server is None or _server.exit_code is not None:
-            command = host_command(state.host, state.facts, ["preview-server"], bpy.app.binary_path)
-            _server = HostProcess(command)
-        _server.send(question.message)
-    except HeadturnError as error:
-        _fail(str(error))
-        return
-    _waiting.append(question)
-    _start_ticking()
-
-
-def with_host(then: Callable[[], None], *, beside: Path | None = None) -> None:
+def with_host(then: Callable[[], None]) -> None:
     """Find and check the host, once, without waiting; call then if it is usable."""
-    from .core.errors import HeadturnError
-    from .core.host import check_host, find_host
-    from .preferences import host_preference
+    conversation.with_host(then, _look())
 
-    if state.facts is not None:
-        then()
-        return
-    preference, blend = host_preference(), bpy.data.filepath
-    beside = beside or (Path(blend).parent if blend else None)
-    state.checking, state.host_error = True, ""
 
-    def look() -> None:
-        try:
-            host = find_host(preference, beside)
-            facts = check_host(host)
-        except HeadturnError as error:
-            problem = str(error)
-            _found.append(lambda: finish(None, None, problem))
-        else:
-            _found.append(lambda: finish(host, facts, facts.problem))
+def host_command(arguments: list[str]) -> list[str]:
+    """The command line of the host that was found."""
+    from .core.host import host_command
 
-    def finish(host: Host | None, facts: HostFacts | None, problem: str) -> None:
-        state.checking = False
-        state.host, state.facts, state.host_error = host, facts if not problem else None, problem
-        if problem:
-            _fail(problem)
-        else:
-            then()
+    host, facts = _host()
+    return host_command(host, facts, arguments, bpy.app.binary_path)
 
-    threading.Thread(target=look, daemon=True).start()
-    _start_ticking()
+
+def host_preference() -> str:
+    """The preference, or "" where the add-on is not enabled as an extension."""
+    addon = bpy.context.preferences.addons.get(__package__)
+    if addon is None or addon.preferences is None:
+        return ""
+    return bpy.path.abspath(addon.preferences.python) if addon.preferences.python else ""
 
 
 def forget_host() -> None:
     """The preference changed: what was found no longer counts."""
-    close()
-    state.host, state.facts, state.host_error = None, None, ""
-
-
-def close() -> None:
-    """End the preview server; nothing that was asked will be answered."""
-    global _server
-    _waiting.clear()
-    _later.clear()
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    if _server is not None:
-        _server.close()
-        _server = None
+    _stop_ticking()
+    conversation.forget_host()
 
 
 def forget() -> None:
     """The extension is disabled: what was found no longer counts."""
-    close()
-    state.__init__()  # type: ignore[misc]
+    forget_host()
+    state.forget()
 
 
-def is_busy() -> bool:
-    """Is an answer due that somebody waits for?"""
-    return state.checking or any(question.busy is not None for question in _waiting)
+def tick() -> float | None:
+    """Take in what the host said. For a timer: seconds until the next time, None if nothing is due."""
+    return TICK_S if conversation.poll() else None
 
 
-def busy() -> str:
-    """What is going on, for the panel; empty if nobody needs to know."""
-    if state.checking:
-        return "looking for Headturn..."
-    return next((question.busy for question in _waiting if question.busy), "")
+def _look() -> Look:
+    preference, blend = host_preference(), bpy.data.filepath
+    beside = Path(blend).parent if blend else None
+
+    def look() -> tuple[Host, HostFacts]:
+        from .core.host import check_host, find_host
+
+        host = find_host(preference, beside)
+        return host, check_host(host)
+
+    return look
 
 
-def redraw() -> None:
-    """Redraw what shows words: the sidebars and the preferences. The 3D views stay: they cost most."""
-    for area in _areas():
-        if area.type == "PREFERENCES":
-            area.tag_redraw()
-        elif area.type == "VIEW_3D":
-            for region in area.regions:
-                if region.type == "UI":
-                    region.tag_redraw()
+def _host() -> tuple[Host, HostFacts]:
+    assert state.host is not None and state.facts is not None, "the host is looked for first"
+    return state.host, state.facts
 
 
-def redraw_views() -> None:
-    """Redraw the 3D views with all that lies over them."""
-    for area in _areas():
-        if area.type == "VIEW_3D":
-            area.tag_redraw()
+def _start_server() -> Server:
+    from .core.process import HostProcess
 
-
-def _areas() -> Iterator[bpy.types.Area]:
-    for window in bpy.context.window_manager.windows:
-        yield from window.screen.areas
-
-
-def _fail(message: str) -> None:
-    state.error = message
-    redraw()
+    return HostProcess(host_command(["preview-server"]))
 
 
 def _start_ticking() -> None:
-    if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=TICK_S)
-    redraw()
+    if not bpy.app.timers.is_registered(tick):
+        bpy.app.timers.register(tick, first_interval=TICK_S)
+    windows.redraw()
 
 
-def _tick() -> float | None:
-    while _found:
-        _found.popleft()()
-        redraw()
-    if _server is not None and _waiting:
-        for answer in _server.poll():
-            question = _waiting.popleft()
-            if "error" in answer:
-                question.on_error(answer["error"])
-            else:
-                question.on_answer(answer)
-            redraw()
-        if _waiting and _server.exit_code is not None:
-            _waiting.clear()
-            _later.clear()
-            _fail(f"the host ended: {_server.last_words()}")
-    if _later and not _waiting and not state.checking:
-        _ask(_later.popleft())
-    return TICK_S if _waiting or state.checking or _found else None
+def _stop_ticking() -> None:
+    if bpy.app.timers.is_registered(tick):
+        bpy.app.timers.unregister(tick)
+
+
+state = State()
+conversation = Conversation(state, _start_server, windows.redraw, _start_ticking)

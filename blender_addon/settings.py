@@ -4,146 +4,101 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 
-from . import session
-from .core.config import (
-    Config,
-    join_names,
-    merged,
-    number,
-    read_config,
-    same,
-    split_names,
-    write_config,
-)
+from generator.errors import UsageError
+from generator.plan.settings import Poses, Values
 
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
-
-PARAMETRIC = "parametric"
-GUESS = "GUESS"
-RENDER = ("preset", "projection", "resolution", "lens_mm", "light_yaw_deg", "light_pitch_deg", "ambient")
-DATASET = ("images", "image_format", "validation")
-RANGES = ("yaw", "pitch", "roll")
-MADE = ("count", "seed", "sampled_expressions")
-LISTS = {"subjects": "only_subjects", "expressions": "only_expressions"}
-MESHES = ("units", "up", "forward")
-POSES = {"kind": "plan", "frame": "frame", "count": "pose_count", "seed": "pose_seed", "path": "csv_path"}
-SHOWN = (
-    *("source", "folder", *MADE, *LISTS.values(), *MESHES, *POSES.values()),
-    *(f"{name}_range" for name in RANGES),
-    *(*RENDER, "background", "frame_head", "distance_mm", *DATASET),
-)
-"""Every setting of the scene that belongs to the configuration."""
+from .core.config import read_config, write_config
+from .core.field import Get
+from .core.fields import fields
+from .core.state import HeadName
+from .core.tables import Sections, check_shown, configuration, located, properties_of, section_of
+from .session import Shown, quiet
 
 
-def to_config(settings: HeadturnSettings) -> Config:
-    """The configuration that this scene shows; what a loaded file held besides is kept."""
-    return merged(json.loads(settings.carried or "{}"), _shown(settings))
+def to_config(shown: Shown) -> Values:
+    """The configuration that this scene shows, and what a loaded file held besides; paths are absolute."""
+    return configuration(_getter(shown), json.loads(shown.carried or "{}"))
 
 
-def from_config(settings: HeadturnSettings, config: Config) -> None:
+def from_config(shown: Shown, config: Values) -> None:
     """Show a configuration; what it does not say is as on the command line.
 
     Raises TypeError, ValueError or OverflowError if the panel cannot show a value.
     """
-    heads, poses = config.get("heads", {}), config.get("poses", {})
-    render, dataset = config.get("render", {}), config.get("dataset", {})
-    with session.quiet():
-        for name in SHOWN:
-            settings.property_unset(name)
-        source = heads.get("source", PARAMETRIC)
-        settings.source = "PARAMETRIC" if source == PARAMETRIC else "FOLDER"
-        settings.folder = "" if source == PARAMETRIC else source
-        values: dict[str, Any] = {name: heads[name] for name in (*MADE, *MESHES) if name in heads}
-        values |= {LISTS[name]: join_names(heads[name]) for name in LISTS if name in heads}
-        values |= {POSES[name]: poses[name] for name in POSES if name in poses}
-        for name in RANGES:
-            if name in poses:
-                step = getattr(settings, f"{name}_range")[2]
-                values[f"{name}_range"] = (*poses[name], step)[:3]
-        values |= {name: render[name] for name in (*RENDER, "background") if name in render}
-        values |= {name: dataset[name] for name in DATASET if name in dataset}
-        settings.frame_head = "distance_mm" not in render
-        if not settings.frame_head:
-            values["distance_mm"] = render["distance_mm"]
-        for name, value in values.items():
-            setattr(settings, name, value)
-        settings.carried = json.dumps(config)
-    # Blender moves a number that is out of range to the end of the range.
-    for section, table in _shown(settings).items():
-        for key, value in table.items():
-            told = config.get(section, {}).get(key)
-            checked = value is not None and told is not None and key not in ("source", "path")
-            if checked and not same(told, value):
-                raise ValueError(f"{section}.{key}: the panel cannot show {told!r}")
+    with quiet():
+        for field in fields():
+            for name in field.properties():
+                shown.property_unset(name)
+        for name, value in properties_of(config).items():
+            setattr(shown, name, value)
+        shown.carried = json.dumps(config)
+    check_shown(_getter(shown), config)
 
 
-def load(settings: HeadturnSettings, path: Path) -> None:
+def load(shown: Shown, path: Path) -> None:
     """Read a configuration file. UsageError if it cannot be shown."""
-    from .core.errors import UsageError
-
-    config = read_config(path)
-    before = to_config(settings)
+    config = located(read_config(path), path.absolute().parent)
+    before = to_config(shown)
     try:
-        from_config(settings, config)
+        from_config(shown, config)
     except (TypeError, ValueError, OverflowError) as error:
-        from_config(settings, before)
+        from_config(shown, before)
         raise UsageError(f"{path}: {' '.join(str(error).split())}") from error
 
 
-def save(settings: HeadturnSettings, path: Path) -> None:
+def save(shown: Shown, path: Path) -> None:
     """Write the configuration of this scene. UsageError if the file cannot be written."""
-    write_config(to_config(settings), path)
+    write_config(to_config(shown), path)
 
 
-def poses_table(settings: HeadturnSettings) -> dict[str, Any]:
-    """The [poses] table."""
-    told = json.loads(settings.carried or "{}").get("poses", {})
-    table: dict[str, Any] = {}
-    for name in RANGES:  # random plans need no step, but a file may name one
-        ends = 3 if settings.plan == "grid" else len(told.get(name, "ab"))
-        table[name] = [number(v) for v in getattr(settings, f"{name}_range")][:ends]
-    return {
-        "kind": settings.plan,
-        "frame": settings.frame,
-        **table,
-        "count": settings.pose_count,
-        "seed": settings.pose_seed,
-        "path": _absolute(settings.csv_path) or None,
-    }
+def poses(shown: Shown) -> Poses:
+    """The [poses] of this scene, with an absolute path."""
+    found: Poses = section_of(to_config(shown), "poses")
+    return found
 
 
-def _shown(settings: HeadturnSettings) -> Config:
-    shown: Config = {
-        "heads": _heads(settings),
-        "poses": poses_table(settings),
-        "render": {name: _plain(getattr(settings, name)) for name in RENDER},
-        "dataset": {name: _plain(getattr(settings, name)) for name in DATASET},
-    }
-    shown["render"]["background"] = [number(c) for c in settings.background]
-    shown["render"]["distance_mm"] = None if settings.frame_head else number(settings.distance_mm)
-    return shown
+def planned(shown: Shown) -> Sections:
+    """The sections of this scene that views follow from."""
+    config = to_config(shown)
+    return Sections(section_of(config, "render"), section_of(config, "poses"))
 
 
-def _heads(settings: HeadturnSettings) -> dict[str, Any]:
-    table: dict[str, Any] = {name: split_names(getattr(settings, LISTS[name])) for name in LISTS}
-    if settings.source == "PARAMETRIC":
-        made = {name: getattr(settings, name) for name in MADE}
-        return {"source": PARAMETRIC, **made, **table, **dict.fromkeys(MESHES)}
-    for name in MESHES:
-        value = getattr(settings, name)
-        table[name] = None if value == GUESS else value
-    return {"source": _absolute(settings.folder), **table}
+def pose(shown: Shown) -> tuple[float, float, float]:
+    """(yaw, pitch, roll) that is shown, degrees."""
+    return shown.yaw, shown.pitch, shown.roll
 
 
-def _absolute(path: str) -> str:
+def radius_mm(shown: Shown) -> float:
+    """Of the sphere about the pivot that holds the head in view, to the host's last digit."""
+    return float(shown.radius)
+
+
+def chosen_head(shown: Shown) -> HeadName:
+    """The head that is chosen; another one is in view until the host has placed it."""
+    return shown.subject, shown.expression
+
+
+def cache_folder() -> Path:
+    """Where prepared and parametric heads are kept while Blender runs."""
+    return Path(bpy.app.tempdir or tempfile.gettempdir()) / "headturn"
+
+
+def absolute(path: str) -> str:
+    """A path of a property; // is the folder of the .blend."""
     return str(Path(bpy.path.abspath(path)).absolute()) if path else ""
 
 
-def _plain(value: Any) -> Any:
-    return number(value) if isinstance(value, float) else value
+def _getter(shown: Shown) -> Get:
+    paths = {name for field in fields() for name in field.paths}
+
+    def get(name: str) -> Any:
+        value = getattr(shown, name)
+        return absolute(value) if name in paths else value
+
+    return get

@@ -4,26 +4,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import bpy
-import numpy as np
-from generator.blender.scene import METRES, fill_scene, turn
-from generator.plan.render_settings import RenderSettings
 
 from generator.blender.materials import srgb_to_linear
-from generator.geometry.camera import framing_distance
+from generator.blender.stage import Stage, turn
+from generator.errors import HeadturnError
 from generator.heads.package import load_package
+from generator.plan.poses import ANGLES
+from generator.plan.view_plan import plan_views
+from generator.plan.views import View
 
-from . import landmarks, overlay, session, settings
+from . import landmarks, overlay, session, settings, stages, windows
 from .core.grid import snapped
-
-if TYPE_CHECKING:
-    from .properties import HeadturnSettings
+from .session import Shown
 
 SCENE = "Headturn"
-PRESET_SAMPLES = {"fast": 1, "quality": 4}
-MARGIN = 1.05
+NOT_COPIED = {"rna_type", "name", "head", "gallery"}
+PREVIEW_SAMPLES = 4
+"""At least so many in a 3D view: one sample has jagged edges."""
 
 
 def studio_scene() -> bpy.types.Scene:
@@ -33,7 +32,7 @@ def studio_scene() -> bpy.types.Scene:
         return current
     scene = bpy.data.scenes.new(SCENE)
     with session.quiet():
-        for name in set(current.headturn.bl_rna.properties.keys()) - {"rna_type", "name", "head", "gallery"}:
+        for name in set(current.headturn.bl_rna.properties.keys()) - NOT_COPIED:
             setattr(scene.headturn, name, getattr(current.headturn, name))
     for window in bpy.context.window_manager.windows:
         if window.scene == current:
@@ -44,30 +43,37 @@ def studio_scene() -> bpy.types.Scene:
 def show_package(scene: bpy.types.Scene, package: Path, radius_mm: float) -> None:
     """Put a prepared head into the scene. Raises HeadError or OSError if it cannot be read."""
     shown = scene.headturn
-    shown.package, shown.radius_mm = str(package), radius_mm
+    shown.package, shown.radius = str(package), repr(float(radius_mm))
     rebuild(scene)
     show_views(shown)
     overlay.ensure()
 
 
+def view_of(shown: Shown) -> View:
+    """What the build would render of the head at this pose."""
+    head = "/".join(settings.chosen_head(shown))
+    return plan_views(settings.planned(shown), head, settings.radius_mm(shown), [settings.pose(shown)])[0]
+
+
 def rebuild(scene: bpy.types.Scene) -> None:
-    """Head, camera, light and render settings, anew."""
+    """Head, camera, light and render settings, anew. Raises HeadError, OSError or RuntimeError."""
     shown = scene.headturn
-    mesh = load_package(Path(shown.package))
-    through_camera = [view for view in _views(scene) if view.region_3d.view_perspective == "CAMERA"]
+    mesh, view = load_package(Path(shown.package)), view_of(shown)
+    through_camera = [space for space in _views(scene) if space.region_3d.view_perspective == "CAMERA"]
     clear(scene)
-    head = fill_scene(scene, mesh, render_settings(shown), distance_mm(shown))
-    for other in [o for o in scene.objects if o.data == head.data and o != head]:
+    stage = Stage(scene, mesh, view.look)
+    for other in [o for o in scene.objects if o.data == stage.head.data and o != stage.head]:
         bpy.data.objects.remove(other)  # a help for final renders that would show in a viewport
-    scene.cycles.preview_samples = max(scene.cycles.samples, 4)
+    scene.cycles.preview_samples = max(view.look.cycles_samples, PREVIEW_SAMPLES)
     scene.cycles.use_preview_denoising = False
     scene.camera.data.passepartout_alpha = 1.0
     for thing in scene.objects:
         thing.hide_select = True
-    shown.head = head
-    turn(head, pose(shown))
-    for view in through_camera:
-        view.region_3d.view_perspective = "CAMERA"
+    shown.head = stage.head
+    stages.keep(scene, stage)
+    _show(scene, stage, view)
+    for space in through_camera:
+        space.region_3d.view_perspective = "CAMERA"
 
 
 def clear(scene: bpy.types.Scene) -> None:
@@ -83,55 +89,44 @@ def clear(scene: bpy.types.Scene) -> None:
         bpy.data.worlds.remove(scene.world)
 
 
-def pose(shown: HeadturnSettings) -> tuple[float, float, float]:
-    """(yaw, pitch, roll) that is shown, degrees."""
-    return shown.yaw, shown.pitch, shown.roll
-
-
-def render_settings(shown: HeadturnSettings) -> RenderSettings:
-    """What the build's render worker would get."""
-    table = settings.to_config(shown)["render"]
-    return RenderSettings.from_dict({"samples": PRESET_SAMPLES[shown.preset], **table})
-
-
-def distance_mm(shown: HeadturnSettings) -> float:
-    """Camera to pivot, as a build computes it."""
-    look = render_settings(shown)
-    if look.distance_mm is not None:
-        return look.distance_mm
-    return round(framing_distance(shown.radius_mm, look.lens_mm, look.margin, look.projection), 2)
-
-
-def set_pose(shown: HeadturnSettings, angles: tuple[float, float, float]) -> None:
+def set_pose(shown: Shown, angles: tuple[float, float, float]) -> None:
     """Show a pose, all three angles at once."""
     with session.quiet():
         shown.yaw, shown.pitch, shown.roll = angles
     pose_changed(shown)
 
 
-def pose_changed(shown: HeadturnSettings) -> None:
+def pose_changed(shown: Shown) -> None:
     """A slider moved: turn the head. Nothing is rebuilt."""
-    if session.is_quiet():
-        return
-    if shown.snap and shown.plan == "grid":
+    if shown.snap and shown.poses_kind == "grid":
         with session.quiet():
-            for name in settings.RANGES:
-                axis = getattr(shown, f"{name}_range")
+            for name in ANGLES:
+                axis = getattr(shown, f"poses_{name}")
                 if axis[2] > 0:
                     setattr(shown, name, snapped(getattr(shown, name), axis))
     if shown.head is not None:
-        turn(shown.head, pose(shown))
+        turn(shown.head, settings.pose(shown))
         landmarks.pose_changed(shown)
 
 
 def look_changed(scene: bpy.types.Scene) -> None:
-    """Camera, light or preset changed."""
-    if not session.is_quiet() and scene.headturn.head is not None:
-        rebuild(scene)
-        landmarks.pose_changed(scene.headturn)
+    """Camera or look changed: they are set, or the scene is built anew where the stage does not fit them."""
+    shown = scene.headturn
+    if shown.head is None:
+        return
+    stage, view = stages.kept(scene), view_of(shown)
+    try:
+        if stage is None or not stage.fits(view.look):
+            rebuild(scene)
+        else:
+            _show(scene, stage, view)
+    except (HeadturnError, OSError, RuntimeError) as error:  # the package went with the Blender that made it
+        session.conversation.fail(f"{' '.join(str(error).split())}; load the heads again")
+        return
+    landmarks.pose_changed(shown)
 
 
-def show_views(shown: HeadturnSettings) -> None:
+def show_views(shown: Shown) -> None:
     """Every 3D view of the scene looks through its camera, shaded as chosen."""
     for space in _views(shown.id_data):
         space.region_3d.view_perspective = "CAMERA"
@@ -140,9 +135,20 @@ def show_views(shown: HeadturnSettings) -> None:
         space.shading.type = shown.viewport
         space.shading.light = "FLAT"
         space.shading.color_type = "TEXTURE"
-        space.shading.background_type = "VIEWPORT"
-        space.shading.background_color = srgb_to_linear(tuple(shown.background))
-    session.redraw_views()
+    _show_background(shown)
+    windows.redraw_views()
+
+
+def _show(scene: bpy.types.Scene, stage: Stage, view: View) -> None:
+    stage.show(view)
+    _show_background(scene.headturn)
+
+
+def _show_background(shown: Shown) -> None:
+    for space in _views(shown.id_data):
+        if space.region_3d.view_perspective == "CAMERA":
+            space.shading.background_type = "VIEWPORT"
+            space.shading.background_color = srgb_to_linear(tuple(shown.render_background))
 
 
 def _views(scene: bpy.types.Scene) -> list[bpy.types.SpaceView3D]:
@@ -163,11 +169,3 @@ def _free_middle(space: bpy.types.SpaceView3D) -> float:
     high = next(region.height for region in area.regions if region.type == "WINDOW")
     side = next(region.width for region in area.regions if region.type == "UI")
     return side / 2 / max(wide, high) / 2 if side > 1 else 0.0
-
-
-def head_axes(shown: HeadturnSettings) -> np.ndarray:
-    """End points of the head's frame in Blender's world, float [4, 3]: pivot, left, up, front."""
-    reach = 1.25 * shown.radius_mm * METRES
-    ends = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [0, -1, 0]]) * reach
-    matrix = np.array(shown.head.matrix_world)
-    return ends @ matrix[:3, :3].T + matrix[:3, 3]

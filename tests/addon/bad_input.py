@@ -27,17 +27,17 @@ def until(true: Callable[[], object]) -> None:
     deadline = time.monotonic() + 90
     while not true():
         assert time.monotonic() < deadline, (session.state, building.current)
-        session._tick()
-        building.current.poll()
+        session.tick()
+        building.poll()
         time.sleep(0.05)
 
 
 def load(folder: Path) -> str:
     """Press Load Heads; what the panel then says is wrong."""
     shown = bpy.context.scene.headturn
-    shown.source, shown.folder = "FOLDER", str(folder)
+    shown.heads_source, shown.heads_source_folder = "FOLDER", str(folder)
     assert bpy.ops.headturn.load_heads() == {"FINISHED"}
-    until(lambda: not session.is_busy())
+    until(lambda: not session.conversation.is_busy)
     return session.state.error
 
 
@@ -45,8 +45,8 @@ def build(out: Path) -> str:
     """Press Build; what the panel then says."""
     scene = bpy.context.scene
     scene.headturn.out = str(out)
-    building.current.forget()
-    session.with_host(lambda: building.current.start(scene))
+    building.forget()
+    session.with_host(lambda: building.start(scene))
     until(lambda: building.current.exit_code is not None)
     return building.current.headline()
 
@@ -75,20 +75,40 @@ def main(folder: Path) -> None:
     made = list(Path(bpy.utils.extension_path_user(EXTENSION, path="thumbnails")).glob("*.png"))
     assert len(made) == 1, "subjects 1 and 3 are the same files: one picture serves both"
 
-    # Sobol poses come from the host.
-    shown.plan, shown.pose_count, shown.on_timeline = "sobol", 16, True
-    until(lambda: bpy.context.scene.frame_end == 16)
-    bpy.context.scene.frame_set(5)
-    pose = shown.yaw
-    bpy.context.scene.frame_set(6)
-    assert shown.yaw != pose
-    shown.plan, shown.on_timeline = "grid", False
+    # Random poses come from the host, and each head has its own.
+    scene = bpy.context.scene
+    shown.poses_count, shown.on_timeline = 16, True
+    for kind in ("uniform", "sobol"):
+        shown.poses_kind = kind
+        until(lambda: scene.frame_end == 16 and not session.conversation.is_busy)
+        poses = []
+        for by in (1, -1):
+            scene.frame_set(5)
+            poses.append((shown.yaw, shown.pitch, shown.roll))
+            scene.frame_set(6)
+            assert shown.yaw != poses[-1][0]
+            bpy.ops.headturn.step_head(what="SUBJECT", by=by)
+            until(lambda: not session.conversation.is_busy)
+            until(lambda: state.displayed == (shown.subject, shown.expression))
+        scene.frame_set(5)
+        assert len(set(poses)) == 2 and (shown.yaw, shown.pitch, shown.roll) == poses[0], poses
+        shown.poses_same = True
+        until(lambda: not session.conversation.is_busy)
+        scene.frame_set(5)
+        shared = shown.yaw
+        bpy.ops.headturn.step_head(what="SUBJECT", by=1)
+        until(lambda: not session.conversation.is_busy)
+        assert shown.yaw == shared and shared not in {yaw for yaw, _, _ in poses}
+        bpy.ops.headturn.step_head(what="SUBJECT", by=-1)
+        until(lambda: not session.conversation.is_busy)
+        shown.poses_same, shown.poses_kind, scene.frame_end = False, "grid", 1
+    shown.on_timeline = False
 
     # The folder vanishes while it is open.
     shutil.rmtree(folder / "facescape")
     vertices = len(shown.head.data.vertices)
     bpy.ops.headturn.step_head(what="SUBJECT", by=1)
-    until(lambda: not session.is_busy())
+    until(lambda: not session.conversation.is_busy)
     assert str(folder / "facescape") in state.error, state.error
     assert state.displayed == ("facescape-1", "neutral") and len(shown.head.data.vertices) == vertices
     said = build(folder / "never")
@@ -97,7 +117,7 @@ def main(folder: Path) -> None:
     assert report.splitlines()[1].startswith("wrong use (exit code 2): no such file"), report
 
     # Another Blender builds into that folder.
-    shown.source, shown.count = "PARAMETRIC", 1
+    shown.heads_source, shown.heads_count = "parametric", 1
     said = build(folder / "held")
     assert building.current.exit_code == 1 and "another build (process " in said, said
     print("passed")

@@ -14,15 +14,16 @@ import bpy
 
 out = Path(sys.argv[sys.argv.index("--") + 1])
 session = import_module("bl_ext.user_default.headturn.session")
-build = import_module("bl_ext.user_default.headturn.building").current
+building = import_module("bl_ext.user_default.headturn.building")
+build = building.current
 shown = bpy.context.scene.headturn
-shown.count, shown.resolution, shown.workers, shown.out = 1, 64, 1, str(out)
-shown.yaw_range = shown.pitch_range = (-40, 40, 1)
-session.with_host(lambda: build.start(bpy.context.scene))
+shown.heads_count, shown.render_resolution, shown.workers, shown.out = 1, 64, 1, str(out)
+shown.poses_yaw = shown.poses_pitch = (-40, 40, 1)
+session.with_host(lambda: building.start(bpy.context.scene))
 marked = False
 while build.exit_code is None:
-    session._tick()
-    build.poll()
+    session.tick()
+    building.poll()
     if build.runs and build.progress.stage == "rendering" and build.progress.done > 0 and not marked:
         marked = True
         pids = {"blender": os.getpid(), "host": build.process.pid}

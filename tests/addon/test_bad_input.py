@@ -22,6 +22,8 @@ HERE = Path(__file__).parent
 sys.path.append(str(HERE.parent / "heads"))
 from facescape_fixture import write_subject  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What needs no Blender: host lookup, processes, the configuration, the grid, the zip."""
+"""The host that is looked up and started, its processes, its progress, and the zip of the extension."""
 
 from __future__ import annotations
 
@@ -7,21 +7,16 @@ import ast
 import sys
 import time
 import zipfile
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 import tomllib
 
-from blender_addon.core import config, grid, headless, host
+from blender_addon.core import headless, host
 from blender_addon.core.process import HostProcess
 from blender_addon.core.progress import Progress, duration
 from generator import __version__
-from generator.errors import UsageError, WorkerError
-from generator.execution.preview.server import PreviewServer
-from generator.plan.config import BuildConfig, load_config
-
-ROOT = Path(__file__).resolve().parents[2]
+from generator.errors import WorkerError
 
 
 def make_python(folder: Path) -> Path:
@@ -71,81 +66,6 @@ def test_a_host_without_bpy_renders_with_the_blender_that_asks() -> None:
     assert host.host_command(found, facts, ["verify", "d"], "/b")[1:] == ["verify", "d"]
 
 
-def test_what_the_panel_writes_is_what_the_command_line_reads(tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    values = {
-        "heads": {"source": 'a "b" \\ ü\x7f', "subjects": ["1", "x"]},
-        "poses": {"kind": "uniform", "yaw": [-0.1, 50], "count": 7},
-        "render": {"ambient": config.number(0.10000000149011612), "background": [0, 0.5, 1]},
-        "dataset": {"images": "none"},
-    }
-    config.write_config(values, path)
-    assert config.read_config(path) == values == tomllib.loads(path.read_text(encoding="utf-8"))
-    read = load_config(path, {})
-    assert read.render.ambient == 0.1 and read.heads.source == values["heads"]["source"]
-
-
-def test_settings_that_no_panel_shows_are_kept() -> None:
-    base = BuildConfig().model_dump(mode="json", exclude_none=True)
-    shown = {"render": {"resolution": 64, "distance_mm": None}}
-    merged = config.merged({**base, "render": {**base["render"], "distance_mm": 500.0}}, shown)
-    assert merged["landmarks"] == base["landmarks"] and merged["render"]["margin"] == base["render"]["margin"]
-    assert merged["render"]["resolution"] == 64 and "distance_mm" not in merged["render"]
-
-
-def test_digits_that_blender_cannot_hold_are_kept() -> None:
-    base = {"poses": {"yaw": [-33.3333333333, 50, 10]}, "render": {"margin": 1.1, "lens_mm": 85.0}}
-    shown = {"poses": {"yaw": [-33.33333, 50, 10]}, "render": {"lens_mm": 85}}
-    assert config.merged(base, shown) == base
-    assert config.merged(base, {"poses": {"yaw": [-33.3334, 50, 10]}})["poses"]["yaw"][0] == -33.3334
-
-
-def test_names_in_a_field_are_separated_by_commas() -> None:
-    assert config.split_names(' anna,  "Lee, Perry" ,3 ') == ["anna", "Lee, Perry", "3"]
-    assert config.split_names(config.join_names(["a", 'b "x", c'])) == ["a", 'b "x", c']
-    assert config.split_names(" , ") is None and config.join_names([]) == ""
-
-
-@pytest.mark.parametrize("text", ["[render", "[unknown]\na = 1", "render = 3"])
-def test_a_bad_configuration_is_refused_with_its_name(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "bad.toml"
-    path.write_text(text)
-    with pytest.raises(UsageError, match=r"bad\.toml"):
-        config.read_config(path)
-
-
-def test_the_timeline_is_the_plan_of_the_build() -> None:
-    poses = BuildConfig().poses
-    plan = grid.plan_poses(poses.model_dump())
-    assert (plan.angles_deg == poses.plan().angles_deg).all() and len(plan) == 693
-    assert grid.snapped(13.0, (-50, 50, 10)) == 10 and grid.snapped(99.0, (-50, 50, 10)) == 50
-    assert len(set(grid.extremes(poses.model_dump()))) == 9
-    assert grid.extremes(poses.model_dump())[0] == (-50, 40, -30)
-
-
-def test_every_plan_of_the_build_is_on_the_timeline(tmp_path: Path) -> None:
-    values = BuildConfig().poses.model_dump() | {"yaw": [10, 50], "count": 9, "seed": 3}
-    table = tmp_path / "poses.csv"
-    table.write_text("yaw_deg,pitch_deg,roll_deg\n5,1,2\n-5,0,7\n", encoding="utf-8")
-    for kind in ("uniform", "sobol", "csv"):
-        poses = {**values, "kind": kind, "path": str(table)}
-        if kind == "sobol":  # takes SciPy, so the host draws it
-            with pytest.raises(grid.NotDrawn):
-                grid.plan_poses(poses)
-            answer = PreviewServer(tmp_path, ExitStack()).answer(
-                {"op": "plan", "poses": poses, "file": str(tmp_path / "p.npy")}
-            )
-            assert answer == {"count": 9}
-            grid.remember(poses, tmp_path / "p.npy")
-            with pytest.raises(grid.NotDrawn):
-                grid.plan_poses({**poses, "seed": 4})
-        planned = load_config(None, {"poses": poses}).poses.plan()
-        assert (grid.plan_poses(poses).angles_deg == planned.angles_deg).all()
-        assert (grid.plan_poses(poses).indices == planned.indices).all()
-    assert grid.extremes({**values, "kind": "csv", "path": str(table)})[:2] == [(-5, 1, 2), (0, 1, 2)]
-    assert {yaw for yaw, _, _ in grid.extremes({**values, "kind": "sobol"})} == {10, 50}
-
-
 def test_progress_adds_up_events() -> None:
     progress = Progress()
     progress.take({"event": "stage", "stage": "rendering", "total": 10})
@@ -176,6 +96,7 @@ def test_a_process_is_read_without_waiting_and_interrupted() -> None:
         HostProcess(["/nowhere/python"])
 
 
+@pytest.mark.slow
 def test_headless_has_the_exit_codes_of_the_command_line(
     host_python: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -195,7 +116,7 @@ def test_the_extension_is_whole_and_private(extension_zip: Path) -> None:
         names = set(archive.namelist())
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
         assert manifest["version"] == __version__ and "wheels" not in manifest
-        assert {"__init__.py", "LICENSE.txt", "generator/blender/scene.py"} <= names
+        assert {"__init__.py", "LICENSE.txt", "generator/blender/stage.py"} <= names
         for name in sorted(names):
             if not name.endswith(".py"):
                 continue
@@ -205,12 +126,3 @@ def test_the_extension_is_whole_and_private(extension_zip: Path) -> None:
                 elif isinstance(node, ast.ImportFrom) and node.level == 0:
                     # scipy belongs to Sobol plans, which the host draws.
                     assert (node.module or "").split(".")[0] in allowed | {"scipy"}, (name, node.module)
-
-
-def test_the_core_knows_no_blender() -> None:
-    for path in (ROOT / "blender_addon" / "core").glob("*.py"):
-        assert "import bpy" not in path.read_text(encoding="utf-8"), path
-    for path in (ROOT / "blender_addon").rglob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        assert text.startswith("# SPDX-License-Identifier: GPL-3.0-or-later\n"), path
-        assert text.count("\n") <= 350, path

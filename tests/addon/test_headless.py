@@ -16,6 +16,8 @@ from generator.dataset.format.manifest import read_manifest
 
 MODULE = "bl_ext.user_default.headturn"
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="session")
 def small_build(parametric_heads: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -8,6 +8,7 @@ separated by colons (`make test-bpy`).
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,13 +16,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from generator.plan.render_settings import RenderSettings
 from placed_head import PlacedHead
 from real_blender import ROOT
 
 from generator.execution.lanes.lines import LineProcess
 from generator.heads.package import save_package
+from generator.messages import OrderDone, Rendered, RenderOrder, WorkerReady, expect, from_json, to_json
 from generator.plan.config import BuildConfig, config_toml, load_config
+from generator.plan.settings import Render
+from generator.plan.views import plan_views
+
+pytestmark = pytest.mark.slow
 
 OTHERS = [name for name in os.environ.get("HEADTURN_BPY_PYTHONS", "").split(":") if name]
 FULL = {
@@ -46,7 +51,15 @@ SOURCES = {
 }  # fmt: skip
 PLANS = {
     "grid": {"yaw": [-33.3333333333, 33.3333333333, 6.66666666666], "frame": "canonical"},
-    "uniform": {"kind": "uniform", "yaw": [-70, 70], "pitch": [-1, 1], "roll": [0, 9], "count": 5, "seed": 4},
+    "uniform": {
+        "kind": "uniform",
+        "yaw": [-70, 70],
+        "pitch": [-1, 1],
+        "roll": [0, 9],
+        "count": 5,
+        "seed": 4,
+        "same": True,
+    },
     "sobol": {"kind": "sobol", "yaw": [0.1, 0.7], "pitch": [-1, 1], "roll": [0, 9], "count": 64},
     "csv": {"kind": "csv", "path": "/poses.csv"},
 }
@@ -59,53 +72,99 @@ def head(placed_head: PlacedHead, tmp_path_factory: pytest.TempPathFactory) -> P
     return package
 
 
+LINES = {
+    "Look": """
+    exposure: float = setting(0.0, "Exposure", unit="stops", low=-5, high=5, label="Exposure")
+    tint: str | None = setting(
+        None, "Tint", choices=(Choice("warm"), Choice("cold", "Like the moon")), label="Colour of the light"
+    )
+""",
+    "Poses": """
+    jitter: tuple[float, float] | None = setting(None, "Jitter", low=0, high=9, label="Jitter")
+""",
+    "Dataset": """
+    notes: tuple[str, ...] = setting((), "Notes", label="Notes", content=False)
+    logo: str | None = setting(None, "A picture", label="Logo", path=True, content=False)
+""",
+}
+"""Settings that are not there, as somebody would add them."""
+
+
+def run_in_wheel(python: str, script: str, *arguments: Path, profile: Path) -> None:
+    """Run a script of this folder in a bpy wheel, to its "passed"."""
+    profile.mkdir()
+    done = subprocess.run(
+        [python, str(Path(__file__).with_name(script)), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(profile)},
+    )
+    assert "passed" in done.stdout and done.returncode == 0, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+
+
 @pytest.mark.parametrize("python", [sys.executable, *OTHERS])
 def test_the_extension_in_a_bpy_wheel(python: str, extension_zip: Path, head: Path, tmp_path: Path) -> None:
-    (tmp_path / "profile").mkdir()
     files = [tmp_path / f"{heads}-{poses}.toml" for heads in SOURCES for poses in PLANS]
     for file in files:
         heads, poses = file.stem.split("-")
         config = load_config(None, {**FULL, "heads": SOURCES[heads], "poses": PLANS[poses]})
         file.write_text(config_toml(config), encoding="utf-8")
-    script = Path(__file__).with_name("wheel_session.py")
-    done = subprocess.run(
-        [python, str(script), str(extension_zip), str(head), str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "profile")},
-    )
-    assert "passed" in done.stdout and done.returncode == 0, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
+    run_in_wheel(python, "wheel_session.py", extension_zip, head, tmp_path, profile=tmp_path / "profile")
     # What the panel saves is what it was given, to the last digit, or the command line's defaults.
     assert load_config(tmp_path / "saved-defaults.toml", {}) == BuildConfig()
     for file in files:
         assert load_config(file.with_name(f"saved-{file.name}"), {}) == load_config(file, {}), file.stem
 
 
+def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None:
+    """A line in generator/plan/settings.py: a property, a row of the panel, TOML there and back."""
+    tree = tmp_path / "tree"
+    for name in ("generator", "blender_addon", "scripts", "LICENSES"):
+        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+    table = tree / "generator" / "plan" / "settings.py"
+    text = table.read_text(encoding="utf-8")
+    for section, lines in LINES.items():
+        start = text.index(f"class {section}:")
+        end = min(k for k in (text.find(mark, start) for mark in ("\n\n\n", "\n    @property")) if k > 0)
+        text = text[:end] + lines.rstrip() + text[end:]
+    table.write_text(text, encoding="utf-8")
+    script = tree / "scripts" / "build_extension.py"
+    made = subprocess.run(
+        [sys.executable, str(script), "--out", str(tmp_path)], check=True, capture_output=True, text=True
+    )
+    package = Path(made.stdout.strip())
+    run_in_wheel(sys.executable, "more_settings_session.py", package, tmp_path, profile=tmp_path / "profile")
+    code = (
+        "import sys; from pathlib import Path; from generator.plan.config import load_config\n"
+        "c = load_config(Path(sys.argv[1]), {})\n"
+        "print(c.render.exposure, c.render.tint, c.poses.jitter, c.dataset.notes, c.dataset.logo)"
+    )
+    for name, values in {
+        "plain": "0.0 None None () None",
+        "full": "-1.3 cold (0.1, 2.0) ('a', 'b, c') /logo.png",
+    }.items():
+        said = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path / f"{name}.toml")],
+            check=True, capture_output=True, text=True, cwd=tree,
+        ).stdout  # fmt: skip
+        assert said.strip() == values
+
+
 @pytest.mark.skipif(not OTHERS, reason="`make test-bpy` runs the oldest and the newest bpy wheel")
 def test_every_bpy_wheel_renders_the_same_face(head: Path, tmp_path: Path) -> None:
-    settings = RenderSettings(resolution=96)
+    views = plan_views(Render(resolution=96, distance_mm=650.0), 120.0, [(30, -20, 10)])
     images = {}
     for python in (sys.executable, *OTHERS):
         out = tmp_path / str(len(images))
         out.mkdir()
         command = [python, "-m", "generator.blender.worker", "1"]
         worker = LineProcess(command, out / "log", {"PYTHONPATH": str(ROOT), "TMPDIR": str(out)})
-        version = worker.receive(100)["ready"]
-        worker.send(
-            {
-                "op": "render",
-                "package": str(head),
-                "settings": settings.as_dict(),
-                "distance_mm": 650.0,
-                "poses": [[30, -20, 10]],
-                "out": str(out),
-                "format": "bmp",
-            }
-        )
-        path = worker.receive(100)["path"]
-        assert worker.receive(100) == {"done": 1}
+        version = expect(WorkerReady, from_json(worker.receive(100))).version
+        worker.send(to_json(RenderOrder(str(head), views, str(out))))
+        path = expect(Rendered, from_json(worker.receive(100))).path
+        expect(OrderDone, from_json(worker.receive(100)))
         images[version] = cv2.imread(path).astype(float)
         worker.close()
     assert {version[:3] for version in images} == {"4.2", "4.5", "5.0"}

@@ -32,7 +32,8 @@ def main(package: str, head: str, folder: str) -> None:
     settings.load(own.headturn, Path(folder) / "saved-defaults.toml")  # what a file leaves out is the default
     before = {name: len(getattr(bpy.data, name)) for name in ("meshes", "materials", "worlds", "cameras")}
     scene = studio.studio_scene()
-    studio.show_package(scene, Path(head), 120.0)
+    studio.show_package(scene, Path(head), 120.000000001)
+    assert settings.radius_mm(scene.headturn) == 120.000000001
     assert scene != own and scene.headturn.head is not None and own.headturn.head is None
 
     shown = scene.headturn
@@ -51,13 +52,27 @@ def main(package: str, head: str, folder: str) -> None:
 
     # The camera is the build's; a new look leaves no old data behind.
     for preset in ("quality", "fast", "quality"):
-        shown.preset = preset
-    shown.lens_mm, shown.resolution = 50, 512
+        shown.render_preset = preset
+    shown.render_lens_mm, shown.render_resolution = 50, 512
     assert scene.camera.data.lens == 50 and scene.render.resolution_x == 512
+    assert round(-1000 * scene.camera.location.y, 2) == round(1.05 * 120 / np.sin(np.arctan(18 / 50)), 2)
+
+    # What the stage can set is set; nothing is built anew. Another number of samples takes another stage.
+    made = [thing.as_pointer() for thing in (shown.head, shown.head.data, scene.camera, scene.world)]
+    shown.render_ambient, shown.render_margin, shown.render_projection = 0.9, 2.0, "orthographic"
+    shown.render_light_yaw_deg, shown.render_background = -40, (0.0, 0.0, 1.0)
+    assert made == [thing.as_pointer() for thing in (shown.head, shown.head.data, scene.camera, scene.world)]
+    assert scene.camera.data.type == "ORTHO" and scene.cycles.samples == 4
+    shown.render_samples_unset, shown.render_samples = False, 9
+    assert scene.cycles.samples == scene.cycles.preview_samples == 9
+    shown.render_samples_unset = True
+    # A stage that lost something is not used.
+    bpy.data.worlds.remove(scene.world)
+    shown.render_lens_mm, shown.render_margin, shown.render_projection = 50.5, 1.05, "perspective"
+    assert scene.world is not None and scene.camera.data.lens == 50.5
     after = {name: len(getattr(bpy.data, name)) for name in before}
     added = {"meshes": 1, "materials": len(shown.head.data.materials), "worlds": 1, "cameras": 1}
     assert after == {name: before[name] + added[name] for name in before}, (before, after)
-    assert studio.distance_mm(shown) == round(1.05 * 120 / np.sin(np.arctan(18 / 50)), 2)
 
     # A configuration that does not fit changes nothing; Blender would take the last one and cut it off.
     bad = Path(folder) / "bad.toml"

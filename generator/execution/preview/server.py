@@ -10,7 +10,7 @@ that fails is answered with ``{"error": "one line"}``. It ends when stdin closes
 ``{"op": "place", "config", "subject", "expression", "package": FILE.npz}``
     finds the head's face and writes it as frame U, mm, pivot at the origin:
     ``{"radius_mm", "vertices", "notes"}``
-``{"op": "pictures", "config", "package": FILE.npz, "radius_mm", "poses": [...],
+``{"op": "pictures", "config", "package": FILE.npz, "head": NAME, "radius_mm", "poses": [...],
 "folder", "landmarks": bool, "sheet": columns}``
     renders poses as a build would: ``{"pictures": [path, ...], "landmarks": [[[x, y], ...] or null, ...]}``
     and, with columns, ``"sheet": path``, all of them in one picture with the landmarks drawn
@@ -118,13 +118,14 @@ class PreviewServer:
         self,
         config: BuildConfig,
         package: str,
+        head: str,
         radius_mm: float,
         poses: list[Pose],
         folder: str,
         landmarks: bool,
         sheet: int = 0,
     ) -> dict[str, Any]:
-        views = plan_views(config, Path(package).stem, radius_mm, poses)
+        views = plan_views(config, head, radius_mm, [(y, p, r) for y, p, r in poses])
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths, found, tiles = [], [], []

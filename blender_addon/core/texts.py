@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings that are texts, choices of texts, or yes and no."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from generator import registries
+from generator.plan.setting import Setting
+
+from .config import join_names, same, split_names
+from .field import Field, Get, Property
+from .words import GUESSED, HELP, titled
+
+GUESS = "GUESS"
+"""The item of a choice that is not given."""
+
+FOLDER = "FOLDER"
+"""The item of heads that lie on the disk."""
+
+EXPANDED = 3
+"""So many choices stand side by side; more are a menu."""
+
+
+class Switch(Field):
+    """bool."""
+
+    def properties(self) -> dict[str, Property]:
+        return {self.name: Property("BoolProperty", {**self.words, "default": bool(self.setting.default)})}
+
+
+class Text(Field):
+    """str; an empty field is one that is not given."""
+
+    @property
+    def style(self) -> str:
+        return "text"
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        return (self.name,) if self.setting.info.path else ()
+
+    def properties(self) -> dict[str, Property]:
+        options = {**self.words, "default": self.setting.default or ""}
+        if self.paths:
+            options["subtype"] = "FILE_PATH"
+        return {self.name: Property("StringProperty", options)}
+
+    def value(self, get: Get) -> Any:
+        return get(self.name) or (None if self.optional else "")
+
+
+class Names(Field):
+    """Several texts, separated by commas."""
+
+    @property
+    def style(self) -> str:
+        return "text"
+
+    def properties(self) -> dict[str, Property]:
+        default = join_names(self.setting.default or ())
+        return {self.name: Property("StringProperty", {**self.words, "default": default})}
+
+    def value(self, get: Get) -> Any:
+        return split_names(get(self.name)) or (None if self.optional else [])
+
+    def properties_of(self, value: Any) -> dict[str, Any]:
+        return {self.name: join_names(value)}
+
+
+class Choice(Field):
+    """One of some texts, or bool | None; GUESS is none of them."""
+
+    @property
+    def style(self) -> str:
+        return "expanded" if len(self._items) <= EXPANDED else "menu"
+
+    @property
+    def _items(self) -> tuple[tuple[str, str, str], ...]:
+        guess = ((GUESS, *GUESSED),) if self.optional else ()
+        if self.kind is bool:
+            return (*guess, ("YES", "Yes", ""), ("NO", "No", ""))
+        return (*guess, *_items(self.setting))
+
+    def properties(self) -> dict[str, Property]:
+        [default] = self.properties_of(self.setting.default).values()
+        return {self.name: Property("EnumProperty", {**self.words, "items": self._items, "default": default})}
+
+    def value(self, get: Get) -> Any:
+        found = get(self.name)
+        if self.kind is bool:
+            return {"YES": True, "NO": False}.get(found)
+        return None if found == GUESS else found
+
+    def properties_of(self, value: Any) -> dict[str, Any]:
+        if isinstance(value, bool):
+            value = "YES" if value else "NO"
+        return {self.name: GUESS if value is None else value}
+
+
+class Choices(Field):
+    """Any number of some texts."""
+
+    @property
+    def style(self) -> str:
+        return "flags"
+
+    def properties(self) -> dict[str, Property]:
+        options = {"items": _items(self.setting), "default": set(self.setting.default or ())}
+        return {self.name: Property("EnumProperty", {**self.words, **options, "options": {"ENUM_FLAG"}})}
+
+    def value(self, get: Get) -> Any:
+        chosen = get(self.name)
+        found = [choice.value for choice in self.setting.choices if choice.value in chosen]
+        return found or (None if self.optional else [])
+
+    def properties_of(self, value: Any) -> dict[str, Any]:
+        return {self.name: set(value)}
+
+    def shows(self, told: Any, value: Any) -> bool:
+        return isinstance(told, (list, tuple)) and sorted(map(str, told)) == sorted(value or ())
+
+
+class Source(Field):
+    """Where heads come from: a maker, or FOLDER and which."""
+
+    @property
+    def style(self) -> str:
+        return "source"
+
+    @property
+    def folder(self) -> str:
+        """The property of the folder."""
+        return f"{self.name}_folder"
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        return (self.folder,)
+
+    def properties(self) -> dict[str, Property]:
+        folder = ("Folder", HELP[f"{self.setting.name}:{FOLDER}"])
+        makers = ((n, titled(n), HELP.get(f"{self.setting.name}:{n}", "")) for n in registries.HEAD_MAKERS)
+        items = (*makers, (FOLDER, *folder))
+        words = {"name": folder[0], "description": folder[1]}
+        return {
+            self.name: Property(
+                "EnumProperty", {**self.words, "items": items, "default": self.setting.default}
+            ),
+            self.folder: Property("StringProperty", {**words, "subtype": "DIR_PATH"}),
+        }
+
+    def value(self, get: Get) -> Any:
+        found = get(self.name)
+        return get(self.folder) if found == FOLDER else found
+
+    def properties_of(self, value: Any) -> dict[str, Any]:
+        if is_made(value):
+            return {self.name: value.partition(":")[0], self.folder: ""}
+        return {self.name: FOLDER, self.folder: value}
+
+    def shows(self, told: Any, value: Any) -> bool:
+        # What a maker is told behind the colon has no property.
+        return same(told, value) or (is_made(told) and told.partition(":")[0] == value)
+
+
+def is_made(source: Any) -> bool:
+    """Does a head source name a maker and no path?"""
+    return isinstance(source, str) and source.partition(":")[0] in registries.HEAD_MAKERS
+
+
+def _items(setting: Setting) -> tuple[tuple[str, str, str], ...]:
+    return tuple((choice.value, titled(choice.name), choice.help) for choice in setting.choices)
