@@ -24,7 +24,7 @@ from generator.heads.package import save_package
 from generator.messages import OrderDone, Rendered, RenderOrder, WorkerReady, expect, from_json, to_json
 from generator.plan.config import BuildConfig, config_toml, load_config
 from generator.plan.settings import Render
-from generator.plan.views import plan_views
+from generator.plan.view_plan import plan_views
 
 pytestmark = pytest.mark.slow
 
@@ -154,7 +154,9 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
 
 @pytest.mark.skipif(not OTHERS, reason="`make test-bpy` runs the oldest and the newest bpy wheel")
 def test_every_bpy_wheel_renders_the_same_face(head: Path, tmp_path: Path) -> None:
-    views = plan_views(Render(resolution=96, distance_mm=650.0), 120.0, [(30, -20, 10)])
+    views = plan_views(
+        BuildConfig(render=Render(resolution=96, distance_mm=650.0)), "a/neutral", 120.0, [(30, -20, 10)]
+    )
     images = {}
     for python in (sys.executable, *OTHERS):
         out = tmp_path / str(len(images))
