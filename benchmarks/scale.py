@@ -42,7 +42,7 @@ MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
 class NoRenderer:
-    """An executor whose frames cost nothing. orders: every build order it was given."""
+    """An executor whose images cost nothing. orders: every build order it was given."""
 
     name, workers = "none", 1
 
@@ -158,7 +158,7 @@ def main() -> None:
         quiet = Quiet()
         with measured("second build: plan, scan, tables, picture, manifest"):
             build(config, root, executor, quiet)
-        planned = quiet.began["rendering"] - quiet.began["preparing heads"]
+        planned = quiet.began["rendering"] - quiet.began["placing heads"]
         print(f"{'  of that heads, plan and scan':52} {planned:8.2f} s")
         with measured("verify --quick"):
             report = verify_dataset(root, quick=True)

@@ -17,7 +17,7 @@ class UsageError(HeadturnError):
 
 
 class HeadError(HeadturnError):
-    """One head cannot be read or prepared; others still can."""
+    """One head cannot be read or placed; others still can."""
 
 
 class DatasetError(HeadturnError):

@@ -30,7 +30,7 @@ def environment() -> None:
 def preview_server(
     blender: Annotated[str | None, typer.Option("--blender", help="A Blender executable.")] = None,
 ) -> None:
-    """Serve previews over stdin and stdout; see generator/execution/preview_server.py."""
+    """Serve previews over stdin and stdout; see generator/execution/preview/server.py."""
     from generator.execution.preview.server import serve
 
     serve(blender)

@@ -138,7 +138,7 @@ def _find(row: HeadRow, config: BuildConfig, root: Path, moved: Path | None) -> 
 def _order(
     row: HeadRow, head: Head, points: np.ndarray, config: BuildConfig, recorded: dict[str, Any], root: Path
 ) -> BuildOrder:
-    """The build order of one pose, with what preparing the head found at the time."""
+    """The build order of one pose, with what placing the head found at the time."""
     placement = Placement(
         units=row.units,
         mm_per_unit=row.mm_per_unit,

@@ -34,7 +34,7 @@ def place_heads(
     for missing in skipped:
         reporter.note(f"skipped {missing.subject}/{missing.expression}: {missing.reason}")
     orders = place_orders(source, config)
-    reporter.stage("preparing heads", len(orders))
+    reporter.stage("placing heads", len(orders))
     planned: list[PlannedHead] = []
     hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
     for outcome in PlacedHeads(root, versions, hashes).outcomes(orders, executor):

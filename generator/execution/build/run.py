@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A build from configuration to finished dataset: plan, prepare, render, commit, sum up."""
+"""A build from configuration to finished dataset: plan, place, render, commit, sum up."""
 
 from __future__ import annotations
 
