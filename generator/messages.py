@@ -221,7 +221,7 @@ def to_json(message: Any) -> dict[str, Any]:
 
 def from_json(values: dict[str, Any]) -> Any:
     """The inverse of :func:`to_json`. Raises ValueError or TypeError for what is no message."""
-    kind = _KINDS.get(values.get("is", ""))
+    kind = _KINDS.get(values.get("is", "")) if isinstance(values, dict) else None
     if kind is None:
         raise ValueError(f"no message: {str(values)[:80]}")
     return from_plain(kind, {key: value for key, value in values.items() if key != "is"})

@@ -1,23 +1,46 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heads and processes that several test folders share."""
+"""Heads and processes that several test folders share, and which tests are slow.
+
+Nothing that Blender, a detector or torch brings along is imported before a fixture is asked for it: so
+the quick tests are collected and run where these are not installed.
+"""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import hypothesis
 import pytest
 from placed_head import PlacedHead
 
-from generator.execution.lanes.renderer import Renderer
-from generator.heads.parametric.make import make_heads
-from generator.heads.read import read_mesh
-from generator.heads.source import find_heads
-from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
-from generator.placing.face import find_face
+if TYPE_CHECKING:
+    from generator.execution.lanes.renderer import Renderer
+    from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 
 SHARED_HEADS = Path(__file__).resolve().parents[2] / "shared" / "heads"
+
+SLOW_FIXTURES = {
+    *("parametric_heads", "renderer", "detector", "placed_head"),  # of this file
+    *("blender_command", "host_python", "extension_zip"),  # of tests/addon
+}
+"""What starts a renderer or a detector, or takes seconds: every test that needs one is slow."""
+
+# The same examples in every run, so that what was red stays red; --hypothesis-profile=search looks for
+# others. No deadline: a busy machine is no fault of the code.
+hypothesis.settings.register_profile("same", derandomize=True, max_examples=50, deadline=None, database=None)
+hypothesis.settings.register_profile("search", max_examples=2000, deadline=None, print_blob=True)
+hypothesis.settings.load_profile("same")
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m "not slow" chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test as slow that needs a slow fixture, directly or not."""
+    for item in items:
+        if SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -37,6 +60,8 @@ def shared_heads() -> Path:
 @pytest.fixture(scope="session")
 def parametric_heads(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two parametric identities, neutral only."""
+    from generator.heads.parametric.make import make_heads
+
     folder = tmp_path_factory.mktemp("parametric") / "heads"
     make_heads(folder, count=2, seed=1)
     return folder
@@ -45,6 +70,8 @@ def parametric_heads(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def renderer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Renderer]:
     """One render worker (the bpy wheel) for everything that needs a frame."""
+    from generator.execution.lanes.renderer import Renderer
+
     folder = tmp_path_factory.mktemp("frames")
     worker = Renderer(folder, folder / "render.log")
     yield worker
@@ -54,6 +81,8 @@ def renderer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Renderer]:
 @pytest.fixture(scope="session")
 def detector() -> Iterator[MediaPipeFaceMesh]:
     """The real detector."""
+    from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
+
     mesh = MediaPipeFaceMesh()
     yield mesh
     mesh.close()
@@ -67,6 +96,10 @@ def placed_head(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> PlacedHead:
     """The first parametric head in frame U, mm, pivot at the origin."""
+    from generator.heads.read import read_mesh
+    from generator.heads.source import find_heads
+    from generator.placing.face import find_face
+
     scratch = tmp_path_factory.mktemp("placed")
     head = find_heads(parametric_heads).heads[0]
     mesh = read_mesh(head, scratch)

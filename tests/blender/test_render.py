@@ -269,6 +269,7 @@ def test_fbx_is_read_by_blender(renderer: Renderer, placed_head: PlacedHead, tmp
     assert shape.std() / shape.mean() < 1e-3, "axes and proportions survive"
 
 
+@pytest.mark.slow
 def test_a_killed_worker_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blender's temporary folder lies in ours, which the next build clears away."""
     elsewhere, ours = tmp_path / "elsewhere", tmp_path / "ours"

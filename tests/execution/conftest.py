@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One finished dataset that the tests of builds compare with."""
+"""Datasets that the tests of builds begin with."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from dry_build import DryBuild
 from small_builds import close_lanes, config_for, run
 
 from generator.plan.config import BuildConfig
@@ -17,6 +18,13 @@ def lanes() -> Iterator[None]:
     """Those that builds of the tests share end with the last test."""
     yield
     close_lanes()
+
+
+@pytest.fixture
+def dry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DryBuild:
+    """Two heads and a folder where nothing is built yet; without the map, which takes most of the time."""
+    monkeypatch.setattr("generator.execution.build.run.detection_map", lambda root, manifest, file: file)
+    return DryBuild(tmp_path, "amy", "bob")
 
 
 @pytest.fixture(scope="session")

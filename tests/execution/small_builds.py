@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from quiet import Quiet
 
 from generator.execution.build.run import BuildResult, build
 from generator.execution.executors.executor import Executor
@@ -30,28 +31,6 @@ SMALL = {
     "render": {"resolution": 96},
     "dataset": {"unit_size": 4},
 }
-
-
-class Quiet:
-    """Remembers what was said."""
-
-    def __init__(self) -> None:
-        self.notes: list[str] = []
-        self.events: list[tuple[str, dict]] = []
-        self.stages: dict[str, int] = {}
-        self.on_frame = lambda: None
-
-    def stage(self, name: str, total: int) -> None:
-        self.stages[name] = total
-
-    def advance(self, steps: int = 1) -> None:
-        self.on_frame()
-
-    def note(self, text: str) -> None:
-        self.notes.append(text)
-
-    def event(self, kind: str, facts: dict) -> None:
-        self.events.append((kind, facts))
 
 
 def config_for(source: Path | str, **sections: dict) -> BuildConfig:

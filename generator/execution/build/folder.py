@@ -111,13 +111,20 @@ def mark(config: BuildConfig, root: Path) -> None:
     write_bytes(root / CONFIG_FILE, config_toml(config.moved_to(root)).encode())
 
 
-def begin(config: BuildConfig, plans: PosePlans, root: Path) -> None:
+def begin(config: BuildConfig, root: Path) -> None:
     """Write what is to be built; from here on the dataset is unfinished until a new manifest says otherwise.
 
     Raises DatasetError if root cannot be written.
     """
     (root / MANIFEST_FILE).unlink(missing_ok=True)
     mark(config, root)
+
+
+def write_poses(plans: PosePlans, root: Path) -> None:
+    """Write poses.csv, once parts under earlier names are gone: before, it is what tells whose they were.
+
+    Raises DatasetError if root cannot be written.
+    """
     write_bytes(root / POSES_FILE, poses_csv(plans).encode())
 
 

@@ -44,6 +44,7 @@ from generator.execution.build.folder import (
     spare_skipped,
     stale_parts,
     start_over,
+    write_poses,
 )
 from generator.execution.build.head_rows import head_anchors, head_row, relative
 from generator.execution.build.lock import locked
@@ -145,8 +146,9 @@ def _build(
     ask_to_drop([part for part in stale if part not in earlier_parts(orders)], root, confirm)
     if carried := carry_over(orders, root, receipts):
         reporter.note(f"{carried} parts were taken over without being rendered again")
-    begin(config, poses.plans, root)
+    begin(config, root)
     drop(stale, root, heads, poses.plans)
+    write_poses(poses.plans, root)
     done, todo = split_done(orders, receipts)
     if done:
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")

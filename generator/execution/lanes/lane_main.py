@@ -42,10 +42,15 @@ def main() -> None:
                     lane = Lane(options)
                 answer(lane.run(from_json(json.loads(line)), lambda: answer(Progressed())))
             except HeadturnError as error:
-                answer(LaneFailed(str(error), type(error).__name__, getattr(error, "log", "")))
+                answer(LaneFailed(str(error), _kind(error), getattr(error, "log", "")))
     finally:
         if lane is not None:
             lane.close()
+
+
+def _kind(error: HeadturnError) -> str:
+    """The class of generator.errors that an error is of, or comes from: the host knows no others."""
+    return next(kind.__name__ for kind in type(error).__mro__ if kind.__module__ == HeadturnError.__module__)
 
 
 if __name__ == "__main__":

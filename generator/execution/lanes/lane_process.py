@@ -19,7 +19,6 @@ from generator.messages import (
     Progressed,
     Receipt,
     expect,
-    from_json,
     to_json,
 )
 
@@ -67,4 +66,4 @@ class LaneProcess:
         self._process.kill()
 
     def _receive(self) -> Any:
-        return from_json(self._process.receive(self._deadline_s))
+        return self._process.receive_message(self._deadline_s)

@@ -14,12 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from generator.errors import WorkerError
+from generator.messages import from_json
 
 LOG_TAIL_LINES = 3
 """Lines of the child's log that go into the one line of an error."""
 
 LOG_END_LINES = 20
 """Lines that are kept with a unit that is given up."""
+
+ENDING_S = 5.0
+"""How long a child that closed its output may take to end."""
 
 
 class LineProcess:
@@ -88,7 +92,16 @@ class LineProcess:
                 f"{self._name} answered with something that is not JSON: {line[:80]!r}"
             ) from error
 
-    def close(self, timeout: float = 5.0) -> None:
+    def receive_message(self, deadline_s: float | None = None) -> Any:
+        """:meth:`receive` of one of :mod:`generator.messages`. WorkerError also if it is none."""
+        values = self.receive(deadline_s)
+        try:
+            return from_json(values)
+        except (ValueError, TypeError) as error:
+            said = f"{self._name} answered with what is no message ({error}): {str(values)[:80]!r}"
+            raise self._error(said) from error
+
+    def close(self, timeout: float = ENDING_S) -> None:
         """Close the child's stdin, wait for its end, kill it if it does not come."""
         self._close_stdin()
         try:
@@ -120,7 +133,11 @@ class LineProcess:
 
     def _ended(self) -> WorkerError:
         self._lines.put("")  # whoever asks again gets the same answer
-        code = self._process.wait()
+        try:
+            code = self._process.wait(ENDING_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            return self._error(f"{self._name} closed its output and did not end, so it was ended")
         how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
         said = " | ".join(self._log_end()[-LOG_TAIL_LINES:])
         return self._error(f"{self._name} {how}: {said or 'it printed nothing'}")

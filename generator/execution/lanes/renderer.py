@@ -25,7 +25,6 @@ from generator.messages import (
     RenderOrder,
     WorkerReady,
     expect,
-    from_json,
     to_json,
 )
 from generator.plan.views import Views
@@ -156,7 +155,7 @@ class Renderer:
         self._process.send(to_json(order))
 
     def _receive(self) -> object:
-        return from_json(self._process.receive(self._deadline_s))
+        return self._process.receive_message(self._deadline_s)
 
     def _receipts(self) -> Iterator[Rendered]:
         """What comes until the order is done."""
