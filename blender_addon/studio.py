@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 
+from generator import registries
 from generator.blender.materials import srgb_to_linear
 from generator.blender.stage import Stage, turn
 from generator.errors import HeadturnError
@@ -104,9 +105,13 @@ def pose_changed(shown: Shown) -> None:
                 axis = getattr(shown, f"poses_{name}")
                 if axis[2] > 0:
                     setattr(shown, name, snapped(getattr(shown, name), axis))
-    if shown.head is not None:
-        turn(shown.head, settings.pose(shown))
-        landmarks.pose_changed(shown)
+    if shown.head is None:
+        return
+    if len(registries.DRAWS):  # camera and look may be drawn for each pose
+        look_changed(shown.id_data)
+        return
+    turn(shown.head, settings.pose(shown))
+    landmarks.pose_changed(shown)
 
 
 def look_changed(scene: bpy.types.Scene) -> None:

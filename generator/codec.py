@@ -57,7 +57,11 @@ def _from(kind: Any, value: Any) -> Any:
         if value is None:
             return None
         return _from(next(a for a in arguments if a is not type(None)), value)
+    if (kind is np.ndarray or is_dataclass(kind) or origin is dict) and not isinstance(value, Mapping):
+        raise TypeError(f"expected an object, got {str(value)[:80]!r}")
     if kind is np.ndarray:
+        if missing := {"dtype", "shape", "data"} - set(value):
+            raise TypeError(f"an array has no {', '.join(sorted(missing))}")
         flat = np.frombuffer(base64.b64decode(value["data"]), dtype=value["dtype"])
         return flat.reshape(value["shape"]).copy()
     if isinstance(kind, type) and is_dataclass(kind):

@@ -46,6 +46,8 @@ class Registry(Generic[T]):
         found = self._entries[name]
         if isinstance(found, str):
             module, _, attribute = found.partition(":")
+            if module.startswith("generator."):  # Blender's extension has a copy of it under its own name
+                module = f"{__package__}{module.removeprefix('generator')}"
             found = getattr(import_module(module), attribute)
         return cast(T, found)
 

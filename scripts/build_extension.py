@@ -20,6 +20,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 ADDON = ROOT / "blender_addon"
+REGISTRIES = "generator/registries.py"
+FOLLOWED = ("DRAWS",)
+"""Registries whose entries the extension uses; it knows the names alone of those in the others."""
+
 _IMPORT = re.compile(r"^(\s*)from generator(\.[\w.]+)? import ", re.MULTILINE)
 _DATE = (2020, 1, 1, 0, 0, 0)
 _SKIPPED = ("README.md",)
@@ -46,6 +50,7 @@ def extension_files() -> dict[str, bytes]:
         if name not in sources:
             sources[name] = path
             todo += _generator_modules(path)
+            todo += _registered_modules(path) if name == REGISTRIES else []
     files = {name: _relative(name, path).encode() for name, path in sources.items()}
     for path in sorted(p for p in ADDON.iterdir() if p.suffix in (".toml", ".md") and p.name not in _SKIPPED):
         files[path.name] = path.read_bytes()
@@ -65,6 +70,18 @@ def write_extension(folder: Path) -> Path:
         for name, content in extension_files().items():
             archive.writestr(zipfile.ZipInfo(name, _DATE), content, zipfile.ZIP_DEFLATED)
     return target
+
+
+def _registered_modules(path: Path) -> list[str]:
+    """Modules of the generator that the followed registries name as "module:attribute"."""
+    found = []
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.AnnAssign) and getattr(node.target, "id", "") in FOLLOWED:
+            texts = [
+                n.value for n in ast.walk(node) if isinstance(n, ast.Constant) and isinstance(n.value, str)
+            ]
+            found += [text.partition(":")[0] for text in texts if text.startswith("generator.")]
+    return found
 
 
 def _generator_modules(path: Path) -> list[str]:

@@ -7,6 +7,8 @@ the quick tests are collected and run where these are not installed.
 
 from __future__ import annotations
 
+import os
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,7 +32,7 @@ SLOW_FIXTURES = {
 
 # The same examples in every run, so that what was red stays red; --hypothesis-profile=search looks for
 # others. No deadline: a busy machine is no fault of the code.
-hypothesis.settings.register_profile("same", derandomize=True, max_examples=50, deadline=None, database=None)
+hypothesis.settings.register_profile("same", derandomize=True, max_examples=20, deadline=None, database=None)
 hypothesis.settings.register_profile("search", max_examples=2000, deadline=None, print_blob=True)
 hypothesis.settings.load_profile("same")
 
@@ -43,10 +45,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.slow)
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Files that are slow throughout are not even imported for the quick tests: torch takes seconds."""
+    if config.option.markexpr != "not slow" or collection_path.suffix != ".py":
+        return None
+    text = collection_path.read_text(encoding="utf-8")
+    return True if re.search(r"^pytestmark = \[?\s*pytest\.mark\.slow", text, re.MULTILINE) else None
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _interruptible() -> None:
     """Ctrl-C works in what the tests start, even where they run in the background and it is ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _unsynced() -> Iterator[None]:
+    """Nothing waits for the disk: what a test writes need not outlive the machine."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, "fsync", lambda handle: None)
+        yield
 
 
 @pytest.fixture(scope="session")

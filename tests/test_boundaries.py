@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -62,8 +64,6 @@ def test_module(path: Path) -> None:
 
 def test_the_render_worker_needs_numpy_and_the_standard_library_alone() -> None:
     """Whatever the worker imports, directly or not, runs inside any Blender."""
-    import sys
-
     allowed = {"numpy", "bpy", "mathutils", "generator", *sys.stdlib_module_names}
     seen, todo = set(), ["generator.blender.worker"]
     while todo:
@@ -79,3 +79,15 @@ def test_the_render_worker_needs_numpy_and_the_standard_library_alone() -> None:
                 pieces = module.split(".")
                 todo += [".".join(pieces[: k + 1]) for k in range(len(pieces)) if pieces[0] == "generator"]
     assert len(seen) > 8
+
+
+@pytest.mark.slow
+def test_quick_tests_are_collected_without_blender_detector_and_torch() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('bpy', 'mathutils', 'mediapipe', 'torch', 'ray'): sys.modules[name] = None\n"
+        "import pytest\n"
+        "sys.exit(pytest.main(['--collect-only', '-q', '-m', 'not slow']))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout[-3000:]

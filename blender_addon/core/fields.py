@@ -26,7 +26,8 @@ def field_of(setting: Setting) -> Field:
     kind, several = plain.kind, get_origin(plain.kind) is tuple
     if kind is bool:
         return Choice(setting) if plain.optional else Switch(setting)
-    if kind in (int, float) or (several and {int, float} & set(get_args(kind))):
+    countless = ... in get_args(kind) and setting.default is None  # Blender's lists have a length
+    if kind in (int, float) or (several and {int, float} & set(get_args(kind)) and not countless):
         return Number(setting)
     if several and str in get_args(kind):
         return Choices(setting) if setting.choices else Names(setting)

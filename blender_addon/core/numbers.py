@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, get_args, get_origin
 
 from generator.plan.setting import Setting
@@ -76,8 +77,9 @@ class Number(Field):
 
     @property
     def _unset(self) -> Unset:
-        low = self.setting.info.low or 0
-        return UNSET.get(self.setting.name, Unset(f"Default {self.words['name']}", WHERE_NOT_GIVEN, low))
+        ends = _scale(self.setting, self._whole)
+        start = min(max(0, ends.get("min", 0)), ends.get("max", math.inf))
+        return UNSET.get(self.setting.name, Unset(f"Default {self.words['name']}", WHERE_NOT_GIVEN, start))
 
 
 def _scale(setting: Setting, whole: bool = False) -> dict[str, Any]:

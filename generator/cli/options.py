@@ -77,7 +77,7 @@ def pose_source(text: str) -> dict[str, Any]:
     if kind == "grid" and not count:
         return {"kind": "grid"}
     if kind in ("uniform", "sobol"):
-        if not count.isdigit():
+        if not count.isdecimal():
             raise UsageError(f"--poses {text!r}: say how many, such as {kind}:500")
         return {"kind": kind, "count": int(count)}
     return {"kind": "csv", "path": text}

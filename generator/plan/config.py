@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -16,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from generator import registries
 from generator.errors import UsageError
+from generator.plan.setting import Choice
 from generator.plan.settings import (
     SECTIONS,
     Dataset,
@@ -116,7 +119,9 @@ def recorded_config(values: Values, root: Path) -> BuildConfig:
     the working directory of the build: where nothing lies there as seen from root, they count from the
     one of this process. Raises UsageError as :func:`load_config` does.
     """
-    values = {**values, "poses": {"same": True, **values.get("poses", {})}}
+    poses = values.get("poses", {})
+    if isinstance(poses, Mapping):
+        values = {**values, "poses": {"same": True, **poses}}
     for setting in _paths(values):
         value = Path(values[setting.section][setting.key])
         if not value.is_absolute() and not (root / value).exists() and value.exists():
@@ -189,18 +194,34 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _validated(values: Mapping[str, Any], where: object) -> BuildConfig:
-    models = {name: _model(name, section) for name, section in SECTIONS.items()}
-    config = ConfigDict(extra="forbid")
-    sections: dict[str, Any] = {name: (model, model()) for name, model in models.items()}
-    whole = create_model("configuration", __config__=config, **sections)
+    whole = _whole_model(tuple(SECTIONS.items()), tuple(known.choices for known in all_settings()))
     try:
         found = whole.model_validate(plain(dict(values)))
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        given = "" if first["type"] in ("missing", "extra_forbidden") else f", got {first['input']!r}"
+        *section, name = (str(part) for part in first["loc"])
+        place = ".".join([*section, name])
+        if first["type"] == "extra_forbidden":
+            kind = "setting" if section else "section"
+            known = [one.key for one in all_settings() if [one.section] == section] or [*SECTIONS]
+            near = ", ".join(get_close_matches(name, known, 1) or known)
+            raise UsageError(f"{where}: {place}: no such {kind}; there is {near}") from error
+        given = "" if first["type"] == "missing" else f", got {first['input']!r}"
         raise UsageError(f"{where}: {place}: {first['msg']}{given}") from error
     return BuildConfig(**{name: section(**dict(getattr(found, name))) for name, section in SECTIONS.items()})
+
+
+@lru_cache(maxsize=16)
+def _whole_model(
+    sections: tuple[tuple[str, type], ...], choices: tuple[tuple[Choice, ...], ...]
+) -> type[BaseModel]:
+    """What pydantic checks. Making it takes longer than using it, so it is made once.
+
+    choices: of every setting; some follow from registries, which may grow.
+    """
+    models = {name: _model(name, section) for name, section in sections}
+    every: dict[str, Any] = {name: (model, model()) for name, model in models.items()}
+    return create_model("configuration", __config__=ConfigDict(extra="forbid"), **every)
 
 
 def _model(name: str, section: type) -> type[BaseModel]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, dataclass, fields
+from functools import cache
 from typing import Any, Literal, get_type_hints
 
 from generator import registries
@@ -267,12 +268,20 @@ def all_settings() -> Iterator[Setting]:
         yield from section_settings(name, section)
 
 
-def section_settings(name: str, section: type) -> Iterator[Setting]:
+@cache
+def section_settings(name: str, section: type) -> tuple[Setting, ...]:
     """The settings of one section."""
     kinds = get_type_hints(section)
-    for found in fields(section):
-        default = found.default if found.default is not MISSING else None
-        yield Setting(name, found.name, kinds[found.name], default, found.metadata["info"])
+    return tuple(
+        Setting(
+            name,
+            found.name,
+            kinds[found.name],
+            found.default if found.default is not MISSING else None,
+            found.metadata["info"],
+        )
+        for found in fields(section)
+    )
 
 
 def known_values(values: Values) -> Values:

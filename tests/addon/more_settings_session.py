@@ -64,6 +64,13 @@ def main(package: str, folder: str) -> None:
     assert names.index("poses_frame") + 1 == names.index("poses_jitter_unset"), names
     assert {"dataset_notes", "dataset_logo"} < set(drawn_by("BuildPanel"))
 
+    plan = importlib.import_module(f"{NAME}.generator.plan.view_plan")
+    planned = settings.planned(shown)
+    views = plan.plan_views(planned, "a/neutral", 120.0, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    near = plan.framed_camera(planned.render, 120.0).distance_mm
+    assert len({view.camera.distance_mm for view in views}) == 2
+    assert all(view.camera.distance_mm > 2 * near for view in views)
+
     settings.save(shown, Path(folder) / "plain.toml")
     shown.render_exposure, shown.render_tint = -1.3, "cold"
     shown.poses_jitter_unset, shown.poses_jitter = False, (0.1, 2)

@@ -129,13 +129,16 @@ def test_settings_of_any_kind_go_there_and_back(monkeypatch: pytest.MonkeyPatch)
     assert kinds["axis"] == ["FloatVectorProperty", "BoolProperty"] and kinds["steps"] == [
         "IntVectorProperty"
     ]
-    assert Properties().options["odd_more"]["min"] == 5
+    options = Properties().options
+    assert options["odd_more"]["min"] == 5
+    assert options["odd_count"]["default"] == 2, "a number that is not given starts within its limits"
 
 
 def test_a_kind_nobody_knows_is_named() -> None:
-    strange = Setting("strange", "table", dict[str, int], None, Info("Table", label="Table"))
-    with pytest.raises(TypeError, match=r"strange\.table: Blender has no property"):
-        field_of(strange)
+    for kind in (dict[str, int], tuple[float, ...] | None):
+        strange = Setting("strange", "table", kind, None, Info("Table", label="Table"))
+        with pytest.raises(TypeError, match=r"strange\.table: Blender has no property"):
+            field_of(strange)
 
 
 @pytest.mark.parametrize(

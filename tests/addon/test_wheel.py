@@ -90,6 +90,19 @@ LINES = {
 """Settings that are not there, as somebody would add them."""
 
 
+DRAW = """# SPDX-License-Identifier: GPL-3.0-or-later
+from dataclasses import replace
+
+from generator.plan.views import View
+
+
+def stand_back(view, rng):
+    farther = replace(view.camera, distance_mm=view.camera.distance_mm * rng.uniform(2, 3))
+    return View(view.pose, farther, view.look)
+"""
+"""Something that differs from image to image."""
+
+
 def run_in_wheel(python: str, script: str, *arguments: Path, profile: Path) -> None:
     """Run a script of this folder in a bpy wheel, to its "passed"."""
     profile.mkdir()
@@ -119,7 +132,10 @@ def test_the_extension_in_a_bpy_wheel(python: str, extension_zip: Path, head: Pa
 
 
 def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None:
-    """A line in generator/plan/settings.py: a property, a row of the panel, TOML there and back."""
+    """A line in generator/plan/settings.py: a property, a row of the panel, TOML there and back.
+
+    And a file with a line in generator/registries.py: a draw that the view shows.
+    """
     tree = tmp_path / "tree"
     for name in ("generator", "blender_addon", "scripts", "LICENSES"):
         shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -130,6 +146,11 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
         end = min(k for k in (text.find(mark, start) for mark in ("\n\n\n", "\n    @property")) if k > 0)
         text = text[:end] + lines.rstrip() + text[end:]
     table.write_text(text, encoding="utf-8")
+    (tree / "generator" / "plan" / "stand_back.py").write_text(DRAW, encoding="utf-8")
+    registries = tree / "generator" / "registries.py"
+    text, entry = registries.read_text(encoding="utf-8"), '{"back": "generator.plan.stand_back:stand_back"}'
+    assert 'Registry("draw", {})' in text
+    registries.write_text(text.replace('("draw", {})', f'("draw", {entry})'), encoding="utf-8")
     script = tree / "scripts" / "build_extension.py"
     made = subprocess.run(
         [sys.executable, str(script), "--out", str(tmp_path)], check=True, capture_output=True, text=True

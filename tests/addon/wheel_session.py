@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -73,6 +74,16 @@ def main(package: str, head: str, folder: str) -> None:
     after = {name: len(getattr(bpy.data, name)) for name in before}
     added = {"meshes": 1, "materials": len(shown.head.data.materials), "worlds": 1, "cameras": 1}
     assert after == {name: before[name] + added[name] for name in before}, (before, after)
+
+    # What a build draws for each image is drawn here, too.
+    draws = importlib.import_module(f"{NAME}.generator.registries").DRAWS
+    draws.add("ambient", lambda view, rng: replace(view, look=replace(view.look, ambient=rng.random())))
+    strengths = []
+    for yaw in (10, 20, 10):
+        shown.yaw = yaw
+        strengths.append(scene.world.node_tree.nodes["Background.001"].inputs["Strength"].default_value)
+    draws.remove("ambient")
+    assert strengths[0] == strengths[2] != strengths[1], strengths
 
     # A configuration that does not fit changes nothing; Blender would take the last one and cut it off.
     bad = Path(folder) / "bad.toml"

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = ("cv2", "embreex", "trimesh", "mediapipe", "bpy", "OpenEXR", "torch")
 
@@ -41,6 +43,7 @@ def run(modules: list[str], blocked: tuple[str, ...], registries: str) -> subpro
     )
 
 
+@pytest.mark.slow
 def test_no_module_of_the_dataset_needs_a_renderer_or_a_detector() -> None:
     files = sorted((ROOT / "generator" / "dataset").rglob("*.py"))
     modules = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]

@@ -95,6 +95,7 @@ def test_a_known_turn_of_the_detector_is_recovered_as_degrees(tmp_path, build, m
         assert everyone["turn_spread"][0][here] == pytest.approx(0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_parts_of_the_face_are_mediapipes():
     connections = pytest.importorskip("mediapipe").solutions.face_mesh_connections
 

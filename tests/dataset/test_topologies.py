@@ -147,14 +147,10 @@ def test_a_topology_without_a_mean_face_says_so() -> None:
         FIVE.reference_face()
 
 
-def test_face_mesh_is_known_by_its_short_names() -> None:
-    from generator.landmarks import detector, reference_face
-
-    assert detector.POINTS == FACE_MESH.count == len(FACE_MESH.reference_face()) == 468
-    assert (detector.RIGHT_EYE_OUTER, detector.LEFT_EYE_OUTER) == (33, 263)
+def test_the_face_mesh_agrees_with_itself() -> None:
+    assert FACE_MESH.count == len(FACE_MESH.reference_face()) == 468
     assert FACE_MESH.mirror_pairs()[33] == 263
-    assert reference_face.surface_face() is FACE_MESH.surface_face()
-    assert TOPOLOGIES.get(detector.TOPOLOGY) is FACE_MESH
+    assert TOPOLOGIES.get(FACE_MESH.name) is FACE_MESH
 
 
 def test_a_subset_draws_its_lines() -> None:

@@ -61,6 +61,7 @@ def test_a_good_dataset(build, tmp_path, images):
     assert "yaw +30, pitch +20: 0% of 4" in report.text()
 
 
+@pytest.mark.slow
 def test_several_processes_find_the_same(build, tmp_path):
     root = tmp_path / "d"
     build(root, "files")

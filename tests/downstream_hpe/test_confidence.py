@@ -15,6 +15,8 @@ from downstream_hpe.networks.confidence import calibrate, level_faces
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
 COUNT = 800
 
+pytestmark = pytest.mark.slow
+
 
 def faces(seed, spread=0.02):
     """Noisy faces at random poses within the range: landmarks, angles."""

@@ -39,6 +39,7 @@ for need in (lambda: predictor.from_image(np.zeros((9, 9, 3), dtype=np.uint8)), 
 """
 
 
+@pytest.mark.slow
 def test_without_everything_else(tmp_path):
     (tmp_path / "m.onnx").write_bytes(tiny_model().SerializeToString())
     ideal.write(tmp_path / "d" / "part.parquet", ideal.rows(np.zeros((468, 3)), "nobody"))

@@ -49,6 +49,7 @@ def test_relative_error_is_the_true_one(noisy):
     assert refined.relative_error < fit.relative_error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refinements", [0, 3])
 def test_agrees_with_tensorly(noisy, refinements):
     peer = pytest.importorskip("tensorly.decomposition")
@@ -97,6 +98,7 @@ def test_only_a_few_heads_are_in_memory_at_once(noisy, monkeypatch):
     assert max(alive) <= 2 * 2 + 2  # and the one that is read, and the one that was handed over
 
 
+@pytest.mark.slow
 def test_missing_cells_are_recovered(clean):
     rng = np.random.default_rng(3)
     observed = rng.random(clean.shape[:4]) > 0.1

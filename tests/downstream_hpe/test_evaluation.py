@@ -89,6 +89,7 @@ def test_split_never_divides_a_subject():
         split_subjects(subjects[:7], 0.25)
 
 
+@pytest.mark.slow
 def test_tables_and_plots(tmp_path, rows):
     results = [
         evaluate("zero", constant_zero(rows.landmarks), rows.rotation),

@@ -70,6 +70,7 @@ def test_too_few_samples_and_bad_values():
         fit_cosines(np.full((4, 1), np.nan), np.arange(4.0))
 
 
+@pytest.mark.slow
 def test_plot_is_written(tmp_path):
     fit = decompose(ideal.tensor(ideal.Faces().draw(6, np.random.default_rng(1))))
     plot_manifolds(fit, fit_manifolds(fit, ideal.AXES), ideal.AXES, tmp_path / "m.png")

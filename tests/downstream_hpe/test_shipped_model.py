@@ -5,17 +5,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from generator.plan.render_settings import RenderSettings
 
 from downstream_hpe.geometry.metrics import euler_errors
 from downstream_hpe.geometry.rotation import angles_from_rotation
 from downstream_hpe.prediction.pictures import read_bgr
 from downstream_hpe.prediction.predictor import MODELS, Predictor
-from generator.geometry.camera import framing_distance
 from generator.geometry.rotation import rotation_from_angles
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
 from generator.placing.anchoring import anchor_head, level_head
+from generator.plan.settings import Lens, Look
+from generator.plan.view_plan import framed_camera
+from generator.plan.views import Views
 
 pytestmark = pytest.mark.slow
 
@@ -38,10 +39,10 @@ def seen(placed_head, renderer, detector, tmp_path_factory):
     level = level_head(placed_head.head, placed_head.placement, levelling, "canonical")
     package = folder / "head.npz"
     save_package(level.normalise(mesh), package)
-    settings = RenderSettings(resolution=256, lens_mm=60.0)
-    distance = framing_distance(level.radius_mm, settings.lens_mm, settings.margin, settings.projection)
+    camera = framed_camera(Lens(resolution=256, lens_mm=60.0), level.radius_mm)
+    views = Views(tuple(map(tuple, POSES)), (camera,), (Look(),))
     found = []
-    for path in renderer.render(package, settings, distance, POSES):
+    for path in renderer.render(package, views):
         found.append(detector.detect(np.ascontiguousarray(read_bgr(path)[..., ::-1])))
     return np.stack(found), rotation_from_angles(np.array(POSES, dtype=float))
 

@@ -26,6 +26,7 @@ from generator.execution.lanes.slot import ATTEMPTS, Outcome
 from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors, no_anchors
+from generator.landmarks.topology import FACE_MESH
 from generator.messages import (
     BuildOrder,
     Built,
@@ -59,7 +60,7 @@ class NoRenderer:
         self.placed: list[PlaceOrder] = []
         self.versions = versions
         self.bad_heads: dict[str, str] = {}
-        self._anchors = anchors or no_anchors()
+        self._anchors = anchors or no_anchors(FACE_MESH)
 
     def before(self, order: LaneOrder) -> None:
         """Nothing; tests put something else in its place."""

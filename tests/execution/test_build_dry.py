@@ -237,6 +237,23 @@ def test_another_configuration_is_refused_with_what_differs(dry: DryBuild) -> No
     dry.check()
 
 
+def test_a_dataset_that_is_moved_with_its_heads_goes_on(
+    dry: DryBuild, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    relative = {"source": "../heads"}
+    monkeypatch.chdir(dry.heads)
+    dry.build(heads=relative)
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    dry.root, dry.heads = dry.root.rename(moved / "dataset"), dry.heads.rename(moved / "heads")
+    monkeypatch.chdir(dry.heads)
+    dry.build(heads=relative)
+    assert not dry.lanes.built
+    dry.check()
+    with pytest.raises(DatasetError, match=r"heads\.source: '.*heads' -> '.*elsewhere'"):
+        dry.build(heads={"source": "elsewhere"})
+
+
 def test_a_folder_that_is_something_else_is_refused(dry: DryBuild) -> None:
     dry.root.mkdir()
     (dry.root / "thesis.txt").write_text("do not overwrite")

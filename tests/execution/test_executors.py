@@ -57,7 +57,7 @@ IN_PROCESSES = EXECUTORS[1:]
 
 @pytest.fixture(scope="module")
 def kept() -> Iterator[dict[str, Executor]]:
-    """Executors that are open: Ray takes seconds to start, so one serves several tests."""
+    """Executors that are open: they take time to start, so one serves several tests."""
     executors: dict[str, Executor] = {}
     yield executors
     for executor in executors.values():
@@ -70,20 +70,18 @@ def opened(
     kept: dict[str, Executor],
     tmp_path_factory: pytest.TempPathFactory,
     monkeypatch: pytest.MonkeyPatch,
-) -> Iterator[Executor]:
+) -> Executor:
     """An executor whose lanes are fake; the parameter is its name."""
     name = request.param
+    with_fake_lanes(name, monkeypatch)
     if name not in kept:
-        with_fake_lanes(name, monkeypatch)
         given = Circumstances(tmp_path_factory.mktemp("scratch"), WORKERS, None, LaneOptions())
         kept[name] = registries.EXECUTORS.get(name)(given)
-    yield kept[name]
-    if name != "ray" and name in kept:
-        kept.pop(name).close()
+    return kept[name]
 
 
 def with_fake_lanes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the executor of that name, which is opened next, start fake lanes."""
+    """Have the executor of that name start fake lanes."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE.parents[1]), str(HERE)]))
     if name == "serial":
         monkeypatch.setattr("generator.execution.executors.serial.Lane", FakeLane)

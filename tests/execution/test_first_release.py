@@ -22,6 +22,7 @@ from generator.execution.build.units import PlannedHead, assign_split, head_came
 from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors, no_anchors
+from generator.landmarks.topology import FACE_MESH
 from generator.plan.config import load_config
 
 FIXTURE = Path(__file__).parent / "first_release"
@@ -120,7 +121,7 @@ def test_what_others_would_render_otherwise_is_not_taken_over(again: Again, vers
 
 
 def test_a_setting_that_it_did_not_have_decides_nothing_until_it_is_used() -> None:
-    planned = planned_head("neutral", PLAIN, no_anchors(), {})
+    planned = planned_head("neutral", PLAIN, no_anchors(FACE_MESH), {})
     assert first_release.names(planned, load_config(None, {}), THEN, NOW) is not None
     assert first_release.names(planned, load_config(None, {}), None, NOW) is None, "nothing is there"
     assert first_release.names(planned, load_config(None, {}), NOW, NOW) is None, "it is of today"
@@ -148,7 +149,7 @@ USED = {
     "poses": {"frame": "canonical"},
 }  # fmt: skip
 NAMES = {
-    "plain": ({}, "neutral", PLAIN, no_anchors(), "57175181dcf892b8", "836c03a67254a6f6"),
+    "plain": ({}, "neutral", PLAIN, no_anchors(FACE_MESH), "57175181dcf892b8", "836c03a67254a6f6"),
     "all": (USED, "smile", TURNED, ANCHORS, "8a311367ab73aa30", "bb910b58898eb76b"),
     "fixed": (
         {"render": {"samples": 9, "distance_mm": 777.5, "resolution": 64}},

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -13,17 +14,24 @@ from no_renderer import MESH, NoRenderer
 from generator.dataset.format.manifest import MANIFEST_FILE
 from generator.errors import DatasetError
 from generator.execution.build import run as build_module
+from generator.execution.build.receipts import RECEIPTS_FILE
 from generator.messages import BuildOrder, LaneOrder
 
 WIDER = {"yaw": [-20, 40, 10]}
 """The grid of SMALL with two more columns at its low end, and two at its high end."""
 
 
-def built_at_once(folder: Path, **sections: dict) -> DryBuild:
-    """The same dataset, built in one go."""
-    other = DryBuild(folder / "at_once", "amy", "bob")
-    other.build(**sections)
-    return other
+@pytest.fixture(scope="module")
+def digest_at_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """The digest of the same two heads at a range of yaw, built in one go."""
+
+    @cache
+    def digest(*yaw: int) -> str:
+        other = DryBuild(tmp_path_factory.mktemp("at_once"), "amy", "bob")
+        other.build(poses={"yaw": yaw})
+        return other.digest
+
+    return digest
 
 
 def test_a_head_more(dry: DryBuild) -> None:
@@ -36,7 +44,9 @@ def test_a_head_more(dry: DryBuild) -> None:
     dry.check()
 
 
-def test_a_grid_that_grows_at_both_ends_renders_only_what_is_new(dry: DryBuild, tmp_path: Path) -> None:
+def test_a_grid_that_grows_at_both_ends_renders_only_what_is_new(
+    dry: DryBuild, digest_at_once: Callable[..., str]
+) -> None:
     dry.build()
     old = {row["sample_id"] for row in dry.rows}
     dry.build(poses=WIDER)
@@ -45,33 +55,38 @@ def test_a_grid_that_grows_at_both_ends_renders_only_what_is_new(dry: DryBuild, 
     places = {(row["yaw_deg"], row["yaw_index"]) for row in dry.rows}
     assert places == {(10.0 * k - 20, k) for k in range(7)}, "also of the rows that were there"
     dry.check()
-    assert dry.digest == built_at_once(tmp_path, poses=WIDER).digest
+    assert dry.digest == digest_at_once(*WIDER["yaw"])
 
 
-def test_a_grid_that_grows_at_its_high_end_leaves_the_parts_alone(dry: DryBuild, tmp_path: Path) -> None:
+def test_a_grid_that_grows_at_its_high_end_leaves_the_parts_alone(
+    dry: DryBuild, digest_at_once: Callable[..., str]
+) -> None:
     dry.build()
     stamps = {name: next(dry.root.rglob(name)).stat().st_mtime_ns for name in dry.parts}
     dry.build(poses={"yaw": [0, 40, 10]})
     assert len(dry.rendered) == 2 * 4
     assert stamps == {name: next(dry.root.rglob(name)).stat().st_mtime_ns for name in stamps}
     dry.check()
-    assert dry.digest == built_at_once(tmp_path, poses={"yaw": [0, 40, 10]}).digest
+    assert dry.digest == digest_at_once(0, 40, 10)
 
 
-def test_a_finer_grid_keeps_the_poses_of_the_coarse_one(dry: DryBuild, tmp_path: Path) -> None:
+def test_a_finer_grid_keeps_the_poses_of_the_coarse_one(
+    dry: DryBuild, digest_at_once: Callable[..., str]
+) -> None:
     dry.build()
     dry.build(poses={"yaw": [0, 20, 5]})
     assert len(dry.rendered) == 2 * 4
     dry.check()
-    assert dry.digest == built_at_once(tmp_path, poses={"yaw": [0, 20, 5]}).digest
+    assert dry.digest == digest_at_once(0, 20, 5)
 
 
-def test_growing_again_and_again(dry: DryBuild, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_growing_again_and_again(dry: DryBuild, digest_at_once: Callable[..., str]) -> None:
     for last in (10, 30, 50):
         dry.build(poses={"yaw": [-last, last, 10]})
         dry.check()
     assert len(dry.rendered) == 2 * 2 * 4
-    assert dry.digest == built_at_once(tmp_path, poses={"yaw": [-50, 50, 10]}).digest
+    assert dry.digest == digest_at_once(-50, 50, 10)
 
 
 def test_poses_are_taken_away_only_when_that_was_agreed_to(dry: DryBuild) -> None:
@@ -138,10 +153,13 @@ def test_a_dataset_that_grows_is_not_finished_until_it_is(dry: DryBuild) -> None
     assert not (dry.root / MANIFEST_FILE).exists()
 
 
-def test_parts_of_a_head_that_broke_are_not_deleted(dry: DryBuild) -> None:
+@pytest.mark.parametrize("receipts", [True, False], ids=["with receipts", "without"])
+def test_parts_of_a_head_that_broke_are_not_deleted(dry: DryBuild, receipts: bool) -> None:
     """Not even when deletion was agreed to: the head may be mended, its renders would be lost."""
     dry.build()
     parts = dry.parts
+    if not receipts:
+        (dry.root / RECEIPTS_FILE).unlink()
     (dry.heads / "bob" / "neutral.obj").write_text("v 0 0 0\n")
     broken = NoRenderer()
     broken.bad_heads["bob/neutral"] = "neutral.obj: no face"
@@ -163,10 +181,21 @@ def test_a_head_that_changed_is_built_again(dry: DryBuild) -> None:
     dry.check()
 
 
-@pytest.mark.parametrize("done", [0, 1], ids=["before", "within"])
-@pytest.mark.parametrize("step", ["carry_over", "begin", "drop", "write_poses", "split_done"])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("step", "done"),
+    [
+        ("carry_over", 0),
+        ("carry_over", 1),
+        ("begin", 0),
+        ("drop", 0),
+        ("drop", 1),
+        ("write_poses", 0),
+        ("split_done", 0),
+    ],
+)
 def test_a_build_that_is_killed_while_it_grows_does_so_the_next_time(
-    dry: DryBuild, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, done: int
+    dry: DryBuild, digest_at_once: Callable[..., str], monkeypatch: pytest.MonkeyPatch, step: str, done: int
 ) -> None:
     """Between taking parts over, removing what lay there before, and writing the new poses, or halfway."""
     dry.build()
@@ -174,7 +203,7 @@ def test_a_build_that_is_killed_while_it_grows_does_so_the_next_time(
 
     def killed(what: Any, *others: Any) -> None:
         if done:
-            whole(what[:1] if isinstance(what, list) else what, *others)
+            whole(what[:done], *others)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
@@ -184,4 +213,4 @@ def test_a_build_that_is_killed_while_it_grows_does_so_the_next_time(
     dry.build(poses=WIDER)
     assert len(dry.rendered) == 2 * (14 - 6)
     dry.check()
-    assert dry.digest == built_at_once(tmp_path, poses=WIDER).digest
+    assert dry.digest == digest_at_once(*WIDER["yaw"])

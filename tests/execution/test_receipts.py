@@ -100,7 +100,9 @@ def test_a_part_of_other_rows_or_damaged_is_none(tmp_path: Path, reader: Reader)
 def test_whose_parts_they_are(tmp_path: Path, reader: Reader) -> None:
     [path] = committed(tmp_path, reader, "a")
     assert Receipts(tmp_path).head_of(path) == ("a", "neutral")
-    assert Receipts(tmp_path).head_of("data/train/b") is None
+    assert not reader.read
+    assert Receipts(tmp_path).head_of(write(tmp_path, "b")) == ("b", "neutral"), "without a receipt, too"
+    assert Receipts(tmp_path).head_of(write(tmp_path, "c", "x")) is None
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,7 @@ def _mesh(head: FixtureHead, squeeze: float = 1.0) -> HeadMesh:
 HEADS = {"face": fixture_head, "ellipsoid": _ellipsoid}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", HEADS)
 @pytest.mark.parametrize("squeeze", [1.0, 0.02])
 def test_balls_fill_the_holes_and_do_not_pierce_the_lids(tmp_path: Path, kind: str, squeeze: float) -> None:

@@ -268,6 +268,7 @@ def test_fbx_goes_through_the_converter_it_is_given(tmp_path: Path, scratch: Pat
     assert len(read_mesh(head, scratch, import_with_blender=convert).materials) == 2
 
 
+@pytest.mark.slow
 def test_a_large_mesh_is_read_whole(tmp_path: Path, scratch: Path) -> None:
     # FaceScape's size: 26 k vertices, 52 k triangles.
     ball = trimesh.creation.uv_sphere(count=[162, 162])

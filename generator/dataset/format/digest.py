@@ -78,7 +78,8 @@ def _numbers(column: pa.Array | pa.ChunkedArray, rows: int) -> np.ndarray:
     if pa.types.is_fixed_size_list(column.type):
         column = column.flatten()
     if pa.types.is_boolean(column.type):
-        return column.to_numpy(zero_copy_only=False).astype(np.uint8).reshape(rows, -1)
+        flags = column.to_numpy(zero_copy_only=False).astype(np.uint8)
+        return flags.reshape(rows, -1) if rows else flags.reshape(0, 1)
     if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
         raise TypeError(f"no canonical encoding for {column.type}")
     array = column.to_numpy(zero_copy_only=False)

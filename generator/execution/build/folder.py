@@ -143,7 +143,7 @@ def stale_parts(root: Path, orders: Iterable[BuildOrder]) -> list[str]:
 def spare_skipped(stale: Iterable[str], skipped: Iterable[SkippedHead], receipts: Receipts) -> None:
     """Raises DatasetError if a part would go only because its head could not be used this time."""
     reasons = {(head.subject, head.expression): head.reason for head in skipped}
-    for path in stale:
+    for path in stale if reasons else ():
         if (head := receipts.head_of(path)) in reasons:
             raise DatasetError(
                 f"{path} belongs to {'/'.join(head)}, which was built before but not this time "

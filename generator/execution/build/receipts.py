@@ -47,9 +47,14 @@ class Receipts:
         return part if part.rows == rows else None
 
     def head_of(self, path: str) -> tuple[str, str] | None:
-        """(subject, expression) of a part that is known, else None."""
+        """(subject, expression) of a part, None if it cannot be read. One without a receipt is read."""
         part, _ = self._known.get(path, (None, None))
-        return (part.subject, part.expression) if part else None
+        if part is None:
+            try:
+                part = check_part(self._root / path)
+            except DatasetError:
+                return None
+        return part.subject, part.expression
 
     def add(self, part: PartInfo) -> None:
         """Note a part that was just committed. Raises DatasetError if that cannot be written."""
