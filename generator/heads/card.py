@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from generator.errors import HeadError
-from generator.heads.paths import quoted
+from generator.escape import quoted
 
 CARD_NAME = "head.json"
 MAX_CARD_BYTES = 1 << 22

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from generator.errors import HeadError
+from generator.escape import printable
 from generator.heads.head import Head, HeadSource
-from generator.heads.paths import printable
 from generator.heads.read import ImportWithBlender, read_mesh
 from generator.heads.textures import image_size
 

@@ -17,9 +17,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from generator.errors import HeadError
+from generator.escape import printable
 from generator.heads.head import Finder, Head, SkippedHead
 from generator.heads.mtl import read_mtl
-from generator.heads.paths import find_inside, printable
+from generator.heads.paths import find_inside
 
 EXPRESSIONS = (
     "neutral", "smile", "mouth_stretch", "anger", "jaw_left", "jaw_right", "jaw_forward",

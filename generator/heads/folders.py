@@ -8,11 +8,12 @@ from collections import Counter
 from pathlib import Path
 
 from generator.errors import HeadError
+from generator.escape import printable
 from generator.heads.card import CARD_NAME, HeadCard, read_card
 from generator.heads.gltf import gltf_files
 from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
 from generator.heads.obj import obj_files
-from generator.heads.paths import check_name, find_inside, natural_key, printable
+from generator.heads.paths import check_name, find_inside, natural_key
 from generator.heads.ply import ply_texture
 
 SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".fbx")

@@ -24,9 +24,10 @@ from trimesh.resolvers import Resolver
 from trimesh.visual import TextureVisuals
 
 from generator.errors import HeadError
+from generator.escape import quoted
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SEE_THROUGH, SKIN
-from generator.heads.paths import find_inside, quoted
+from generator.heads.paths import find_inside
 from generator.heads.textures import check_image, has_holes, open_image
 
 MAX_VERTICES = 20_000_000

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.errors import HeadError
-from generator.heads.paths import MissingFile, find_inside, quoted
+from generator.escape import quoted
+from generator.heads.paths import MissingFile, find_inside
 from generator.heads.textures import IMAGE_SUFFIXES
 
 HEADER_BYTES = 1 << 16

@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError
+from generator.escape import quoted
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.mtl import MtlMaterial, decode, find_library, find_stem_texture, read_mtl
-from generator.heads.paths import MissingFile, find_inside, quoted
+from generator.heads.paths import MissingFile, find_inside
 from generator.heads.textures import check_image, combine_alpha, has_holes
 
 SKIN = (0.80, 0.62, 0.53)

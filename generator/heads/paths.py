@@ -13,10 +13,10 @@ import unicodedata
 from pathlib import Path
 
 from generator.errors import HeadError
+from generator.escape import quoted
+from generator.names import name_problem
 
-MAX_NAME_LENGTH = 100
 _DRIVE = re.compile(r"^[A-Za-z]:")
-_RESERVED = frozenset('/\\<>:"|?*')
 _NUMBER = re.compile(r"(\d+)")
 
 
@@ -24,30 +24,15 @@ class MissingFile(HeadError):
     """A file that a head names is not in the head's folder."""
 
 
-def printable(text: str) -> str:
-    """A stranger's text on one line: what no terminal should get is escaped."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
-def quoted(text: str) -> str:
-    """A stranger's name in quotes, for a message."""
-    return f"'{printable(text if len(text) <= 80 else text[:77] + '...')}'"
-
-
 def check_name(name: str, what: str) -> str:
     """``name``, if it can be an identity that later becomes part of a file name.
 
     Raises
     ------
-    HeadError: it is empty or long, holds a path separator, "..", a control
-        character or bytes that are not text, or begins or ends with a dot or a blank.
+    HeadError, with what is wrong.
     """
-    if not name or len(name) > MAX_NAME_LENGTH:
-        raise HeadError(f"the {what} {quoted(name)} must have 1 to {MAX_NAME_LENGTH} characters; rename it")
-    if any(unicodedata.category(c).startswith(("C", "Z")) and c != " " for c in name):
-        raise HeadError(f"the {what} {quoted(name)} holds characters that cannot be printed; rename it")
-    if set(name) & _RESERVED or ".." in name or name.strip(" .") != name:
-        raise HeadError(f"the {what} {quoted(name)} could be mistaken for a path; rename it")
+    if problem := name_problem(name):
+        raise HeadError(f"the {what} {quoted(name)} {problem}; rename it")
     return name
 
 

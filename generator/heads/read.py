@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from generator.errors import HeadError
+from generator.escape import printable
 from generator.heads.eyeballs import add_eyeballs
 from generator.heads.gltf import read_gltf
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.obj import read_obj
-from generator.heads.paths import printable
 from generator.heads.ply import read_ply
 from generator.heads.weld import weld
 

@@ -75,7 +75,7 @@ def test_unit_refuses_what_does_not_fit(rows, change):
 
 @pytest.mark.parametrize("name", ["a/b", "..", "", "a\n", "C:", "a ", ".hidden"])
 def test_unit_refuses_names_that_are_paths(rows, name):
-    with pytest.raises(DatasetError, match="cannot be used as a name"):
+    with pytest.raises(DatasetError, match="choose another name"):
         replace(rows, subject=name)
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 
 import pyarrow as pa
@@ -17,7 +16,9 @@ from generator.dataset.format.columns import (
     version_number,
 )
 from generator.errors import DatasetError, UsageError
+from generator.escape import quoted
 from generator.landmarks.topology import FACE_MESH, Topology
+from generator.names import name_problem
 from generator.registries import TOPOLOGIES
 
 
@@ -126,11 +127,8 @@ def is_newer(version: str, than: str = SCHEMA_VERSION) -> bool:
 
 def check_name(what: str, name: str) -> None:
     """Raises DatasetError unless name can be a folder and a part of a sample_id on every system."""
-    if not re.fullmatch(r"\w([\w .+-]*[\w+-])?", name):
-        raise DatasetError(
-            f"{what} {name!r} cannot be used as a name; "
-            "use letters, digits, '_', '-', '+', '.' and inner spaces"
-        )
+    if problem := name_problem(name):
+        raise DatasetError(f"{what} {quoted(name)} {problem}; choose another name")
 
 
 def sample_id(subject: str, expression: str, pose: str) -> str:
