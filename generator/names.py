@@ -24,6 +24,7 @@ MAX_NAME_BYTES = 200
 """With a suffix and a prefix still a file name, which has at most 255 bytes."""
 
 _RESERVED = frozenset('/\\<>:"|?*')
+_DRIVE = re.compile(r"[A-Za-z]:")
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
@@ -61,6 +62,17 @@ def as_inside_path(text: object) -> InsidePath:
         if name_problem(piece):
             raise ValueError("is no path inside the folder")
     return InsidePath(text)
+
+
+def source_path_problem(text: str) -> str:
+    """What keeps text from being a file below a folder of heads, or "".
+
+    Files of heads may have names that no :data:`Name` has; but none is absolute, and none leaves the folder.
+    """
+    pieces = text.replace("\\", "/").split("/")
+    if "\0" in text or ".." in pieces or "" in pieces or _DRIVE.match(text):
+        return "is no path inside the folder of the heads"
+    return ""
 
 
 def inside(root: Path, path: InsidePath) -> Path:

@@ -10,6 +10,9 @@ import numpy as np
 from generator.geometry.rigid import fit_similarity
 from generator.landmarks.topology import Topology
 
+WEIGHTS_SUM = 1e-9
+"""How near to 1 the barycentric weights of an anchor add up."""
+
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
@@ -46,6 +49,18 @@ class Anchors:
         if not self.views:
             return ["no face was found near the front: landmarks_exact is NaN"]
         return [f"{self.absent} landmarks have no place on the mesh: NaN"] if self.absent else []
+
+    def contradiction(self, topology: Topology) -> str:
+        """What cannot be so whatever the mesh, or "": arrays of other shapes, weights that do not add up."""
+        shapes = (self.triangles.shape, self.weights.shape, self.points.shape)
+        if shapes != ((topology.count,), (topology.count, 3), (topology.count, 3)):
+            return f"its anchors are not {topology.count} points"
+        there = self.triangles >= 0
+        if (np.isfinite(self.points).all(axis=1) != there).any():
+            return "an anchor has a triangle and no place, or a place and no triangle"
+        if (np.abs(self.weights[there].sum(axis=1) - 1) > WEIGHTS_SUM).any():
+            return "the weights of an anchor do not add up to 1"
+        return ""
 
     def asymmetry_mm(self, topology: Topology) -> float:
         """Rms distance of each anchor from the mirror image of its partner, after a rigid fit."""

@@ -117,6 +117,21 @@ class Surface:
             triangles[row], weights[row] = near[best], candidates[best]
         return triangles, weights
 
+    def off(self, points: np.ndarray) -> int:
+        """How many points are farther than TOLERANCE_MM from the surface. float [P, 3]; NaN does not count.
+
+        A triangle through a point faces one of the three axes within 55 degrees, so a short ray along
+        that axis meets it; only where none does, such as on an open edge, the nearest point is looked for.
+        """
+        todo = points[np.isfinite(points).all(axis=1)]
+        for axis in np.eye(3):
+            start, along = todo - TOLERANCE_MM * axis, np.broadcast_to(axis, todo.shape)
+            found = self._scene.run(start.astype(np.float32), along.astype(np.float32), output=True)
+            todo = todo[(found["primID"] < 0) | (found["tfar"] > 2 * TOLERANCE_MM)]
+        triangles, weights = self.nearest(todo)
+        near = np.linalg.norm(self.points(triangles, weights) - todo, axis=1) <= TOLERANCE_MM
+        return int((~near).sum())
+
     def visible(self, points: np.ndarray, views: Views) -> np.ndarray:
         """Which points of the surface the camera of each view sees.
 

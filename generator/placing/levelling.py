@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.geometry.rigid import fit_similarity
-from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, angles_from_rotation, graphics_rotation
+from generator.geometry.rotation import angles_from_rotation, graphics_rotation
+from generator.landmarks.facing import facing
 from generator.landmarks.topology import Topology
-
-FEWEST_SHARE = 0.427
-"""Of a topology's points: fewer anchors are no face to level. 200 of Face Mesh's."""
 
 SHAPE_SD_DEG = (0.3, 3.2, 0.1)
 """Standard deviation of yaw, pitch and roll of this fit over the 24 heads of
@@ -40,16 +37,9 @@ def level(points: np.ndarray, views: np.ndarray, topology: Topology) -> Levellin
     points: float [P, 3], anchors, frame C, NaN where absent.
     views: float [V, P, 3], the same from each view alone.
     """
-    rotation = _rotation(points, topology)
+    rotation = facing(points, topology)
     if rotation is None:
         return None
-    single = [angles_from_rotation(r) for view in views if (r := _rotation(view, topology)) is not None]
+    single = [angles_from_rotation(r) for view in views if (r := facing(view, topology)) is not None]
     noise = np.var(single, axis=0, ddof=1) / len(single) if len(single) > 1 else np.zeros(3)
     return Levelling(graphics_rotation(rotation.T), np.sqrt(noise + np.square(SHAPE_SD_DEG)))
-
-
-def _rotation(points: np.ndarray, topology: Topology) -> np.ndarray | None:
-    known = np.isfinite(points).all(axis=1)
-    if known.sum() < FEWEST_SHARE * topology.count:
-        return None
-    return fit_similarity((topology.surface_face() @ CAMERA_FROM_GRAPHICS)[known], points[known]).rotation

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,10 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import DatasetError, UsageError
+from generator.names import as_name
 from generator.plan.config import BuildConfig
 from generator.plan.draws import Seed, draw_seed
 from generator.plan.poses import ANGLES, PosePlan, csv_plan, grid_plan, plan_of, sobol_plan, uniform_plan
 from generator.plan.settings import Poses
+from generator.reading import MAX_STATE_BYTES, read_text
 
 HeadName = tuple[str, str]
 """(subject, expression)."""
@@ -114,16 +117,15 @@ def read_pose_plans(file: Path) -> PosePlans:
     """The inverse of :func:`poses_csv`. Raises DatasetError if it is not such a file."""
     rows: dict[HeadName | None, list[tuple[list[float], list[int], int]]] = defaultdict(list)
     try:
-        with file.open(encoding="utf-8", newline="") as opened:
-            reader = csv.reader(opened)
-            names = next(reader)
-            at = {name: place for place, name in enumerate(names)}
-            own, chunked = _HEAD[0] in at, CHUNK in at
-            angles, indices = ([at[f"{a}_{what}"] for a in ANGLES] for what in ("deg", "index"))
-            for row in reader:
-                head = (row[at["subject"]], row[at["expression"]]) if own else None
-                chunk = int(row[at[CHUNK]]) if chunked else -1
-                rows[head].append(([float(row[k]) for k in angles], [int(row[k]) for k in indices], chunk))
+        reader = csv.reader(io.StringIO(read_text(file, MAX_STATE_BYTES), newline=""))
+        names = next(reader)
+        at = {name: place for place, name in enumerate(names)}
+        own, chunked = _HEAD[0] in at, CHUNK in at
+        angles, indices = ([at[f"{a}_{what}"] for a in ANGLES] for what in ("deg", "index"))
+        for row in reader:
+            head = (as_name(row[at["subject"]]), as_name(row[at["expression"]])) if own else None
+            chunk = int(row[at[CHUNK]]) if chunked else -1
+            rows[head].append(([float(row[k]) for k in angles], [int(row[k]) for k in indices], chunk))
         if not rows:
             raise ValueError("it has no rows")
         return _plans(rows, own, chunked)

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from generator.dataset.format.columns import list_of
 from generator.dataset.format.manifest import configuration_digest, read_manifest, write_manifest
 from generator.dataset.format.part import check_part
+from generator.sealed import sealed
 
 # As commit 95c4e57 had them.
 ROWS_1_0 = (
@@ -70,7 +71,7 @@ def as_schema_1_9(root: Path) -> Path:
     values = json.loads((root / "manifest.json").read_text(encoding="utf-8"))
     values["weather"] = {"sun": True}
     values["parts"] = [{**part, "mood": "good"} for part in values["parts"]]
-    (root / "manifest.json").write_text(json.dumps(values), encoding="utf-8")
+    (root / "manifest.json").write_text(json.dumps(sealed(values)), encoding="utf-8")
     return root
 
 

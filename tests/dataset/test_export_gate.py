@@ -20,6 +20,7 @@ from generator.dataset.export.options import OVERRIDE, ExportOptions
 from generator.dataset.export.run import export_dataset
 from generator.errors import DatasetError, HeadturnError, UsageError
 from generator.registries import FORMATS
+from generator.sealed import sealed
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +81,7 @@ def test_rows_are_left_out_of_parts_that_hold_several_heads(mixed, tmp_path):
     manifest = json.loads((tmp_path / "d" / "manifest.json").read_text())
     for part in manifest["parts"]:
         part["subject"] = part["expression"] = ""  # what the manifest says of a part of several heads
-    (tmp_path / "d" / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / "d" / "manifest.json").write_text(json.dumps(sealed(manifest)))
     options = ExportOptions(only_redistributable=True)
     assert export_dataset(tmp_path / "d", "huggingface", tmp_path / "out", options).rows == 18
 

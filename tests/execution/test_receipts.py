@@ -14,13 +14,20 @@ from generator.dataset.format.part_info import PartInfo
 from generator.errors import DatasetError
 from generator.execution.build import receipts as module
 from generator.execution.build.receipts import RECEIPTS_FILE, Receipts, split_done
+from generator.messages import BuildOrder
+
+FOUR, THREE = (unit_order(Path("nowhere"), "a", images=images) for images in (4, 3))
+"""Orders of so many images."""
 
 
 class Reader:
-    """Stands for check_part: a part is as many rows as its file has bytes; "x" is damaged."""
+    """Stands for check_unit: a part is as many rows as its file has bytes; "x" is damaged."""
 
     def __init__(self) -> None:
         self.read: list[str] = []
+
+    def unit(self, root: Path, path: str, order: BuildOrder) -> PartInfo:
+        return self(root / path)
 
     def __call__(self, file: Path) -> PartInfo:
         self.read.append(file.name)
@@ -36,6 +43,7 @@ def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
     """In the place of what reads Parquet."""
     reader = Reader()
     monkeypatch.setattr(module, "check_part", reader)
+    monkeypatch.setattr(module, "check_unit", reader.unit)
     return reader
 
 
@@ -52,21 +60,21 @@ def committed(root: Path, reader: Reader, *names: str) -> list[str]:
     paths = [write(root, name) for name in names]
     receipts = Receipts(root)
     for path in paths:
-        receipts.add(reader(root / path))
+        receipts.add(reader(root / path), FOUR)
     reader.read.clear()
     return paths
 
 
 def test_a_part_that_is_not_there(tmp_path: Path, reader: Reader) -> None:
-    assert Receipts(tmp_path).valid_part("data/train/a", 4) is None
+    assert Receipts(tmp_path).valid_part("data/train/a", FOUR) is None
     [path] = committed(tmp_path, reader, "a")
     (tmp_path / path).unlink()
-    assert Receipts(tmp_path).valid_part(path, 4) is None, "its receipt does not stand for it"
+    assert Receipts(tmp_path).valid_part(path, FOUR) is None, "its receipt does not stand for it"
 
 
 def test_what_was_noted_is_not_read_again(tmp_path: Path, reader: Reader) -> None:
     [path] = committed(tmp_path, reader, "a")
-    part = Receipts(tmp_path).valid_part(path, 4)
+    part = Receipts(tmp_path).valid_part(path, FOUR)
     assert part == PartInfo(path, 4, 1, 4, "0", "0", "a", "neutral")
     assert not reader.read
 
@@ -74,7 +82,7 @@ def test_what_was_noted_is_not_read_again(tmp_path: Path, reader: Reader) -> Non
 def test_what_was_not_is_read_once(tmp_path: Path, reader: Reader) -> None:
     path = write(tmp_path, "a")
     receipts = Receipts(tmp_path)
-    assert receipts.valid_part(path, 4) == receipts.valid_part(path, 4)
+    assert receipts.valid_part(path, FOUR) == receipts.valid_part(path, FOUR)
     assert reader.read == ["a"]
 
 
@@ -88,13 +96,13 @@ def test_what_changed_is_read_again(tmp_path: Path, reader: Reader, change: str)
         os.utime(file, ns=(stamp, stamp))
     else:
         os.utime(file, ns=(stamp, stamp + 10**9))
-    assert Receipts(tmp_path).valid_part(path, 4 - (change == "size")) is not None
+    assert Receipts(tmp_path).valid_part(path, THREE if change == "size" else FOUR) is not None
     assert reader.read == ["a"]
 
 
 def test_a_part_of_other_rows_or_damaged_is_none(tmp_path: Path, reader: Reader) -> None:
-    assert Receipts(tmp_path).valid_part(write(tmp_path, "a"), 5) is None
-    assert Receipts(tmp_path).valid_part(write(tmp_path, "b", "x"), 1) is None
+    assert Receipts(tmp_path).valid_part(write(tmp_path, "a"), THREE) is None
+    assert Receipts(tmp_path).valid_part(write(tmp_path, "b", "x"), FOUR) is None
 
 
 def test_whose_parts_they_are(tmp_path: Path, reader: Reader) -> None:
@@ -116,9 +124,9 @@ def test_lines_that_a_crash_left_cost_time_and_nothing_else(
     lines = file.read_text().splitlines()
     file.write_text(f"{rubbish}\n{lines[0]}\n{lines[1][:-9]}")  # the last is cut short
     receipts = Receipts(tmp_path)
-    assert receipts.valid_part(first, 4) and receipts.valid_part(second, 4)
+    assert receipts.valid_part(first, FOUR) and receipts.valid_part(second, FOUR)
     assert reader.read == ["b"]
-    receipts.add(reader(tmp_path / second))
+    receipts.add(reader(tmp_path / second), FOUR)
     assert json.loads(file.read_text().splitlines()[-1])["part"]["path"] == second, "on a line of its own"
 
 

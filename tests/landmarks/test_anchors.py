@@ -210,3 +210,21 @@ def test_the_surface_face_is_symmetric() -> None:
     pairs = FACE_MESH.mirror_pairs()
     np.testing.assert_allclose(face[pairs] * [-1, 1, 1], face, atol=0.011)
     assert np.abs(face.mean(axis=0)).max() < 0.01
+
+
+def test_points_beside_the_surface_are_counted(ellipsoid: HeadMesh, truth: np.ndarray) -> None:
+    surface = Surface(ellipsoid)
+    points = truth.copy()
+    points[5] = np.nan
+    assert surface.off(points) == 0
+    points[:7] *= 1 + 1e-2
+    assert surface.off(points) == 6, "NaN is no place beside the surface"
+    assert surface.off(truth @ rotation_from_angles(np.array([20.0, 0, 0])).T) > 400
+
+
+def test_a_point_on_an_open_edge_is_on_the_surface() -> None:
+    corner = np.array([[0.0, 0, 0], [30, 0, 0], [0, 30, 0]])
+    surface = Surface(plain(corner, np.array([[0, 1, 2]])))
+    edge = surface.points(np.zeros(3, int), np.array([[1.0, 0, 0], [0.5, 0.5, 0], [0, 0.3, 0.7]]))
+    assert surface.off(edge) == 0
+    assert surface.off(edge + np.array([0, 0, 1.0])) == 3

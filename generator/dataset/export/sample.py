@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from generator.errors import DatasetError
+from generator.escape import printable
 from generator.plan.poses import pose_name
 
 JPEG_QUALITY = 95
@@ -80,6 +80,15 @@ class Sample:
         return file.getvalue()
 
 
-def suffix_of(name: str, encoded: bytes) -> str:
-    """The suffix of an image's name, or of its first bytes where it has no name."""
-    return Path(name).suffix.lower() or (".jpg" if encoded[:2] == b"\xff\xd8" else ".png")
+_BEGINNINGS = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
+
+
+def suffix_of(encoded: bytes, name: str) -> str:
+    """The suffix that an image gets, by its first bytes: what a file is called says nothing about it.
+
+    name: of its row. Raises DatasetError: it is neither PNG nor JPEG.
+    """
+    for beginning, suffix in _BEGINNINGS.items():
+        if encoded.startswith(beginning):
+            return suffix
+    raise DatasetError(f"the image of {printable(name)} is neither PNG nor JPEG; see `headturn verify`")

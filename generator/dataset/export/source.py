@@ -16,7 +16,7 @@ from generator.dataset.export.sample import Sample, suffix_of
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.missing import Missing
-from generator.dataset.format.open import as_array, image_bytes, read_rows
+from generator.dataset.format.open import IMAGE_FACTS, as_array, proven_image, read_rows
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.row_cameras import COLUMNS as CAMERA
 from generator.dataset.format.row_cameras import RowCameras
@@ -117,7 +117,7 @@ class Source:
         columns = [*_TEXT, *_NUMBERS, *CAMERA, *(f"{angle}_deg" for angle in ANGLES)]
         columns += _POINTS if self.landmarks else ()
         if self.has_images:
-            columns += ["image_path", *(["image"] if self.manifest.images == "embedded" else [])]
+            columns += [*IMAGE_FACTS, *(["image"] if self.manifest.images == "embedded" else [])]
         for batch in self.batches(columns=columns):
             yield from self._samples(batch if self.landmarks else self.kept(batch))
 
@@ -126,7 +126,7 @@ class Source:
         values = {name: as_array(batch, name) for name in _NUMBERS}
         angles = np.stack([as_array(batch, f"{angle}_deg") for angle in ANGLES], axis=-1)
         cameras = RowCameras.of(batch)
-        images = batch.select(["image_path"]).to_pylist() if self.has_images else None
+        images = batch.select(IMAGE_FACTS).to_pylist() if self.has_images else None
         points, origin, visible = self._points(batch, cameras)
         for k in range(len(batch)):
             if self.landmarks and not self._has_points(text["sample_id"][k], origin[k]):
@@ -136,8 +136,8 @@ class Source:
                 row = images[k]
                 if self.manifest.images == "embedded":
                     row = {**row, "image": batch.column("image")[k].as_py()}
-                image = image_bytes(self.root, row)
-                suffix = suffix_of(row["image_path"] or row["image"]["path"], image)
+                image = proven_image(self.root, row, text["sample_id"][k])
+                suffix = suffix_of(image, text["sample_id"][k])
             yield Sample(
                 sample_id=text["sample_id"][k],
                 subject=text["subject"][k],

@@ -16,7 +16,7 @@ from generator.dataset.export.source import Source
 from generator.dataset.format.columns import ROWS
 from generator.dataset.format.defaults import todays_schema
 from generator.dataset.format.heads_table import copy_heads
-from generator.dataset.format.open import image_bytes
+from generator.dataset.format.open import IMAGE_FACTS, proven_image
 from generator.dataset.format.part import part_schema_of, write_table
 
 IMAGE = "image"
@@ -92,11 +92,11 @@ def _exported(source: Source, batch: pa.RecordBatch, schema: pa.Schema) -> pa.Re
         images = []
         for name, row in zip(
             batch.column("sample_id").to_pylist(),
-            batch.select(["image_path", *(["image"] if embedded else [])]).to_pylist(),
+            batch.select([*IMAGE_FACTS, *(["image"] if embedded else [])]).to_pylist(),
             strict=True,
         ):
-            encoded = image_bytes(source.root, row)
-            suffix = suffix_of(row["image_path"] or row["image"]["path"], encoded)
+            encoded = proven_image(source.root, row, name)
+            suffix = suffix_of(encoded, name)
             images.append({"bytes": encoded, "path": name.replace("/", "_") + suffix})
         columns.append(pa.array(images, schema.field(IMAGE).type))
     return pa.record_batch(columns, schema=schema)

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from generator.dataset.format.columns import SCHEMA_VERSION, list_of
 from generator.dataset.format.files import one_line, write_atomically
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import heads_version, read_heads
 from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
 from generator.errors import DatasetError
@@ -85,7 +86,7 @@ def read_anchors(root: Path) -> dict[tuple[str, str], HeadAnchors]:
     In a dataset older than the table no head has any.
     Raises DatasetError: the file is missing, damaged or of another version.
     """
-    path = root / ANCHORS_FILE
+    path = dataset_file(root, ANCHORS_FILE)
     if not path.is_file() and is_newer(ANCHORS_SINCE, heads_version(root)):
         heads = [(head.subject, head.expression) for head in read_heads(root)]
         return {name: no_head_anchors(*name) for name in heads}

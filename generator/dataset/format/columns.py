@@ -71,6 +71,8 @@ class Column:
         of another image mode, and for a reader of an older dataset that lacks it.
     images: only datasets with images of this mode have values. Without a default the others
         do not have the column.
+    guard: the text becomes the name of a file ("name"), or is names joined by "/" ("path", which may be
+        empty where that is the default): see :mod:`generator.dataset.format.guard`.
     local: points at files of the dataset's folder, which do not travel with an export of the table.
     nullable: as declared only; verify proves that there are no nulls.
     """
@@ -84,6 +86,7 @@ class Column:
     since: str = "1.0.0"
     default: Any = None
     images: ImageMode | None = None
+    guard: Literal["name", "path"] | None = None
     local: bool = False
     nullable: bool = False
 
@@ -150,12 +153,13 @@ def _row_columns() -> tuple[Column, ...]:
     same, placed, image = Compare(), "every row once", "images"
     return (
         Column("sample_id", text, "subject/expression/pose, such as p0003/neutral/y+30_p-10_r+0; unique",
-               "identity", lambda rows: rows.sample_ids),
-        Column("subject", text, "the person", placed, lambda rows: [rows.subject] * len(rows)),
+               "identity", lambda rows: rows.sample_ids, guard="path"),
+        Column("subject", text, "the person", placed, lambda rows: [rows.subject] * len(rows),
+               guard="name"),
         Column("expression", text, "the expression, such as neutral", placed,
-               lambda rows: [rows.expression] * len(rows)),
+               lambda rows: [rows.expression] * len(rows), guard="name"),
         Column("split", text, "train or validation: by subject, never by image", "identity",
-               lambda rows: [rows.split] * len(rows)),
+               lambda rows: [rows.split] * len(rows), guard="name"),
         Column("head_license", text, "the head's own licence", "identity",
                lambda rows: [rows.head_license] * len(rows)),
         Column("redistributable", pa.bool_(), "may renders of the head be published?", "identity",
@@ -200,14 +204,14 @@ def _row_columns() -> tuple[Column, ...]:
         Column("height", pa.int32(), "of the image, pixels", "camera",
                lambda rows: rows.of_cameras(lambda camera: camera.height), same),
         Column("image_path", text, "of the image file, relative to the dataset; else empty", image,
-               lambda rows: rows.image_paths, default="", images="files", local=True),
+               lambda rows: rows.image_paths, default="", images="files", guard="path", local=True),
         Column("image_sha256", text, "of the image file's bytes, also where images are not stored", image,
                lambda rows: rows.image_hashes, Compare("image", says="the image differs")),
         Column("passes_path", text, "OpenEXR of the passes, relative to the dataset; empty without passes",
-               "passes", lambda rows: rows.passes_paths, since="1.1.0", default="", local=True),
+               "passes", lambda rows: rows.passes_paths, since="1.1.0", default="", guard="path", local=True),
         Column("passes_sha256", text, "of the floats of the passes; empty without passes", "passes",
                lambda rows: rows.passes_hashes, Compare(says="the floats of the passes differ"),
-               since="1.1.0", default="", local=True),
+               since="1.1.0", default="", guard="path", local=True),
         # Nullable by declaration only: Hugging Face datasets takes a struct for an image only if its
         # fields may be null.
         Column("image", pa.struct([("bytes", pa.binary()), ("path", text)]),

@@ -12,10 +12,17 @@ from typing import BinaryIO, Protocol
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import write_atomically
 from generator.dataset.format.folders import folder_beside, share_files
-from generator.dataset.format.manifest import Manifest, read_manifest, write_manifest
+from generator.dataset.format.guard import dataset_file
+from generator.dataset.format.manifest import (
+    CONFIG_FILE,
+    MANIFEST_FILE,
+    Manifest,
+    read_manifest,
+    write_manifest,
+)
 from generator.dataset.format.part import (
     check_part,
-    iter_stored,
+    iter_checked,
     part_schema_of,
     part_writer,
     row_groups,
@@ -25,7 +32,10 @@ from generator.errors import DatasetError
 
 TARGET_BYTES = 256 * 10**6
 
-_MERGED = ("data", "manifest.json", "config.toml", "receipts.jsonl", "prepared.jsonl", "build.log")
+_MERGED = (
+    *("data", MANIFEST_FILE, CONFIG_FILE),
+    *("receipts.jsonl", "placed.jsonl", "prepared.jsonl", "build.log"),
+)
 """What of a dataset's folder is written anew, or belongs to its build: the new one cannot be built on."""
 
 
@@ -84,12 +94,12 @@ def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> 
     split = group[0].path.split("/")[1]
     name = hashlib.sha256("".join(part.digest for part in group).encode()).hexdigest()[:16]
     path = work / "data" / split / f"part-{number:05d}-{name}.parquet"
-    schema = part_schema_of(source / group[0].path)
+    schema = part_schema_of(dataset_file(source, group[0].path))
 
     def write(file: BinaryIO) -> None:
         with part_writer(file, schema) as writer:
             for part in group:
-                for rows in row_groups(iter_stored(source / part.path)):
+                for rows in row_groups(iter_checked(dataset_file(source, part.path))):
                     writer.write_table(rows)
 
     def check(temporary: Path) -> PartInfo:

@@ -40,15 +40,29 @@ def share_files(source: Path, target: Path, without: Collection[str]) -> None:
     """Give target what lies in source, besides the named files and what is hidden.
 
     Folders hold files that are never changed in place: they are linked, or copied where the disk has no
-    links. Files beside them may grow, such as logs: they are copied. Raises OSError.
+    links. Files beside them may grow, such as logs: they are copied. Raises OSError; DatasetError: a link
+    leads out of source, or something there is neither file nor folder.
     """
     for path in sorted(source.iterdir()):
         if path.name in without or path.name.startswith("."):
             continue
+        _check_plain(path, source)
         if path.is_dir():
             shutil.copytree(path, target / path.name, copy_function=_link_file)
         else:
             shutil.copy2(path, target / path.name)
+
+
+def _check_plain(path: Path, root: Path) -> None:
+    """Raises DatasetError unless all in path is files, folders, and links that stay inside of root."""
+    inside = [path]
+    if path.is_dir() and not path.is_symlink():
+        inside += [Path(at) / name for at, folders, files in os.walk(path) for name in (*folders, *files)]
+    for entry in inside:
+        if entry.is_symlink() and not entry.resolve().is_relative_to(root.resolve()):
+            raise DatasetError(f"{entry}: a link out of the dataset; put the file itself there, or remove it")
+        if not (entry.is_dir() or entry.is_file()):
+            raise DatasetError(f"{entry}: neither a file nor a folder; remove it")
 
 
 def _link_file(path: str, target: str) -> None:

@@ -14,10 +14,13 @@ import pyarrow.parquet as pq
 
 from generator.dataset.format.columns import SCHEMA_VERSION, Column, columns_at, list_of
 from generator.dataset.format.files import one_line, write_atomically
+from generator.dataset.format.guard import check_head_texts, dataset_file
 from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
 from generator.errors import DatasetError
+from generator.escape import quoted
 from generator.geometry.camera import Camera, Projection
 from generator.landmarks.topology import FACE_MESH
+from generator.names import source_path_problem
 
 HEADS_FILE = "heads.parquet"
 IDENTITY = tuple(np.eye(3).reshape(-1).tolist())
@@ -181,7 +184,7 @@ def copy_heads(source: Path, chosen: Collection[tuple[str, str]], target: Path) 
     """Write the chosen (subject, expression) of source's heads.parquet into target, as today's columns
     and with those of a later schema that we do not know. Raises DatasetError as :func:`read_heads` does."""
     heads = [head for head in read_heads(source) if (head.subject, head.expression) in chosen]
-    stored = _read(source / HEADS_FILE)
+    stored = _read(dataset_file(source, HEADS_FILE))
     if not is_newer(stored_version(stored.schema)):
         write_heads(heads, target)
         return
@@ -194,7 +197,7 @@ def read_heads(root: Path) -> list[HeadRow]:
 
     Raises DatasetError: the file is missing, damaged, of another version, or names a head twice.
     """
-    path = root / HEADS_FILE
+    path = dataset_file(root, HEADS_FILE)
     table = _read(path)
     version = stored_version(table.schema)
     expected = heads_schema(version)
@@ -202,6 +205,9 @@ def read_heads(root: Path) -> list[HeadRow]:
     if not (known if is_newer(version) else table).schema.equals(expected):
         raise DatasetError(f"{path}: not the columns of a table of heads; run `headturn build` again")
     heads = [_from_dict(row) for row in known.to_pylist()]
+    check_head_texts(((head.subject, head.expression, head.split) for head in heads), path)
+    for head in heads:
+        _check_files(head, path)
     if len({(head.subject, head.expression) for head in heads}) < len(heads):
         raise DatasetError(f"{path}: a head is there twice; run `headturn build` again")
     return heads
@@ -209,7 +215,7 @@ def read_heads(root: Path) -> list[HeadRow]:
 
 def heads_version(root: Path) -> str:
     """The schema version of heads.parquet. Raises DatasetError as :func:`read_heads` does."""
-    return stored_version(_read(root / HEADS_FILE).schema)
+    return stored_version(_read(dataset_file(root, HEADS_FILE)).schema)
 
 
 def _read(path: Path) -> pa.Table:
@@ -229,6 +235,12 @@ def _write(table: pa.Table, root: Path) -> None:
         lambda file: pq.write_table(table, file, compression="zstd", write_page_checksum=True),
         lambda _: None,
     )
+
+
+def _check_files(head: HeadRow, where: Path) -> None:
+    for path in (head.mesh_path, *(path for path, _ in head.file_sha256)):
+        if problem := source_path_problem(path):
+            raise DatasetError(f"{where}: the file {quoted(path)} of {head.subject} {problem}")
 
 
 def _as_dict(head: HeadRow) -> dict[str, Any]:

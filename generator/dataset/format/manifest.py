@@ -9,21 +9,30 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any, get_type_hints
+from typing import Annotated, Any, cast
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from generator.dataset.format.anchors_table import ANCHORS_FILE, ANCHORS_SINCE
 from generator.dataset.format.columns import IMAGE_MODES, SCHEMA_VERSION, ImageMode
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256, one_line, write_bytes
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HEADS_FILE
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import check_schema_version, is_newer
 from generator.errors import DatasetError
+from generator.escape import printable
+from generator.names import as_name
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE
+from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
+from generator.sealed import SEAL, seal_of, sealed
 
 MANIFEST_FILE = "manifest.json"
+CONFIG_FILE, FAILURES_FILE = "config.toml", "failures.jsonl"
 _PART_PATH = re.compile(r"data/[\w+-][\w .+-]*/part-[\w .+-]+\.parquet")
+_HASH = r"^[0-9a-f]{64}$"
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,7 @@ class Manifest:
     created_by: the command line, for people; the only field that may differ
         between two builds of the same configuration.
     tables: SHA-256 of the files of :func:`side_tables`; :func:`write_manifest` fills it in.
+    files: SHA-256 of config.toml and failures.jsonl, where they are there; filled in likewise.
     others: values of a later schema that we do not know, kept as they are.
     """
 
@@ -50,6 +60,7 @@ class Manifest:
     failures: int = 0
     created_by: str = ""
     tables: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
     schema_version: str = SCHEMA_VERSION
     others: dict[str, Any] = field(default_factory=dict)
 
@@ -90,6 +101,7 @@ class Manifest:
             "tables": self.tables,
             "parts": [asdict(part) for part in sorted(self.parts, key=lambda part: part.path)],
             "created_by": self.created_by,
+            **({"files": self.files} if self.files else {}),
             **self.others,
         }
 
@@ -115,6 +127,15 @@ def side_tables(schema_version: str) -> tuple[str, ...]:
     return (HEADS_FILE, *anchors, POSES_FILE)
 
 
+def covered_files(root: Path) -> dict[str, str]:
+    """SHA-256 of the small files of a dataset that no reader of its rows needs, where they are there.
+
+    Raises OSError if one cannot be read.
+    """
+    there = [name for name in (CONFIG_FILE, FAILURES_FILE) if (root / name).exists()]
+    return {name: file_sha256(dataset_file(root, name)) for name in there}
+
+
 def portable_command(arguments: Sequence[str]) -> str:
     """A command line without the folders of the machine it ran on: "/home/x/a.toml" becomes "a.toml"."""
     return " ".join(_without_folder(argument) for argument in arguments)
@@ -126,43 +147,52 @@ def write_manifest(manifest: Manifest, root: Path) -> None:
     Raises DatasetError: one of its :func:`side_tables` is not there, or it cannot write.
     """
     try:
-        tables = {name: file_sha256(root / name) for name in side_tables(manifest.schema_version)}
+        tables = {
+            name: file_sha256(dataset_file(root, name)) for name in side_tables(manifest.schema_version)
+        }
     except OSError as error:
         raise DatasetError(
             f"{error.filename}: cannot be read ({error.strerror}); write it before the manifest"
         ) from error
-    manifest = replace(manifest, tables=tables)
-    text = json.dumps(manifest.as_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    manifest = replace(manifest, tables=tables, files=covered_files(root))
+    text = json.dumps(sealed(manifest.as_dict()), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_bytes(root / MANIFEST_FILE, text.encode())
 
 
 def read_manifest(root: Path) -> Manifest:
     """The manifest of a finished dataset.
 
-    Raises DatasetError: there is none, it is not one, it is of another version,
-    or it contradicts itself.
+    Raises DatasetError: there is none, it is not one, it is of another version, it
+    contradicts itself, or its seal is not its own.
     """
-    path = root / MANIFEST_FILE
     if not root.is_dir():
         raise DatasetError(f"{root}: no such folder; give the folder that `headturn build --out` wrote")
-    if not path.is_file():
+    path = dataset_file(root, MANIFEST_FILE)
+    if not path.exists():
         raise DatasetError(
             f"{root}: not a Headturn dataset, or its build did not finish (no {MANIFEST_FILE}); "
             "run `headturn build` again"
         )
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = parse_json(read_limited(path, MAX_STATE_BYTES))
         check_schema_version(values["schema_version"], str(path))
-        if is_newer(values["schema_version"]):
-            names = get_type_hints(PartInfo)
-            values["parts"] = [{name: part[name] for name in names} for part in values["parts"]]
-        manifest = _parse(values)
-        changed = [key for key, value in manifest.as_dict().items() if values[key] != value]
+        known = _known(values)
+        manifest = _parse(known)
+        changed = [key for key, value in manifest.as_dict().items() if known[key] != value]
+    except ValidationError as error:
+        first = error.errors()[0]
+        what = f"{printable('.'.join(map(str, first['loc'])))}: {printable(first['msg'])}"
+        raise DatasetError(
+            f"{path}: not a manifest of Headturn ({what}); run `headturn build` again"
+        ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DatasetError(
-            f"{path}: not a manifest of Headturn ({type(error).__name__}: {one_line(error)}); "
+            f"{path}: not a manifest of Headturn ({type(error).__name__}: {printable(one_line(error))}); "
             "run `headturn build` again"
         ) from error
+    # Before there were seals a manifest had none.
+    if not changed and SEAL in values and values[SEAL] != seal_of(values):
+        changed = ["something in it"]
     if changed:
         raise DatasetError(
             f"{path}: {', '.join(changed)} contradicts the rest: the file was changed after the build; "
@@ -171,33 +201,87 @@ def read_manifest(root: Path) -> Manifest:
     return manifest
 
 
+class _Part(BaseModel):
+    """A :class:`PartInfo`, from a file that may say anything."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    path: str
+    rows: Annotated[int, Field(ge=0)]
+    detected: Annotated[int, Field(ge=0)]
+    bytes: Annotated[int, Field(ge=0)]
+    sha256: Annotated[str, Field(pattern=_HASH)]
+    digest: Annotated[str, Field(pattern=_HASH)]
+    subject: str
+    expression: str
+
+
+class _Images(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    mode: str
+    count: int
+
+
+class _Stored(BaseModel):
+    """manifest.json, from a file that may say anything. See :meth:`Manifest.as_dict`."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    schema_version: str
+    digest: str
+    rows: int
+    detected_rows: int
+    heads: Annotated[int, Field(ge=0)]
+    skipped: list[dict[str, str]]
+    failures: Annotated[int, Field(ge=0)]
+    images: _Images
+    versions: dict[str, str]
+    configuration_digest: str
+    configuration: dict[str, Any]
+    tables: dict[str, str]
+    parts: Annotated[list[_Part], Field(min_length=1)]
+    created_by: str
+    files: dict[str, str] = {}
+    sha256: str = ""
+
+
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    """The values without what a later schema says of a part besides."""
+    if not is_newer(values["schema_version"]):
+        return values
+    return {
+        **values,
+        "parts": [{name: part[name] for name in _Part.model_fields} for part in values["parts"]],
+    }
+
+
 def _parse(values: dict[str, Any]) -> Manifest:
-    kinds = get_type_hints(PartInfo)
-    for part in values["parts"]:
-        if any(type(part[name]) is not kind for name, kind in kinds.items()):
-            raise ValueError(f"a part is described by {part}")
-        if not _PART_PATH.fullmatch(part["path"]):
-            raise ValueError(f"{part['path']!r} is not where a part can be")
-    if values["images"]["mode"] not in IMAGE_MODES:
-        raise ValueError(f"images: {values['images']['mode']!r} is none of {', '.join(IMAGE_MODES)}")
+    others = {}
+    if is_newer(values["schema_version"]):
+        others = {name: value for name, value in values.items() if name not in _Stored.model_fields}
+    stored = _Stored.model_validate({name: value for name, value in values.items() if name not in others})
+    for part in stored.parts:
+        if not _PART_PATH.fullmatch(part.path):
+            raise ValueError(f"{part.path!r} is not where a part can be")
+        for name in filter(None, (part.subject, part.expression)):
+            as_name(name)
+    if stored.images.mode not in IMAGE_MODES:
+        raise ValueError(f"images: {stored.images.mode!r} is none of {', '.join(IMAGE_MODES)}")
     return Manifest(
-        versions=values["versions"],
-        configuration=values["configuration"],
-        parts=tuple(PartInfo(**part) for part in values["parts"]),
-        images=values["images"]["mode"],
-        heads=values["heads"],
-        skipped=tuple(values["skipped"]),
-        failures=values["failures"],
-        created_by=values["created_by"],
-        tables=values["tables"],
-        schema_version=values["schema_version"],
-        others=_unknown(values) if is_newer(values["schema_version"]) else {},
+        versions=stored.versions,
+        configuration=stored.configuration,
+        parts=tuple(PartInfo(**part.model_dump()) for part in stored.parts),
+        images=cast(ImageMode, stored.images.mode),
+        heads=stored.heads,
+        skipped=tuple(stored.skipped),
+        failures=stored.failures,
+        created_by=stored.created_by,
+        tables=stored.tables,
+        files=stored.files,
+        schema_version=stored.schema_version,
+        others=others,
     )
-
-
-def _unknown(values: dict[str, Any]) -> dict[str, Any]:
-    known = Manifest({}, {}, (), "none", 0).as_dict()
-    return {key: value for key, value in values.items() if key not in known}
 
 
 def _without_folder(argument: str) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,14 +15,23 @@ import pyarrow.dataset as ds
 
 from generator.dataset.format.columns import ROWS
 from generator.dataset.format.defaults import todays_schema, with_defaults
+from generator.dataset.format.guard import check_texts, dataset_file
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.part import BATCH, part_schema_of
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import topology_of
 from generator.errors import DatasetError
+from generator.escape import printable
 from generator.landmarks.topology import FACE_MESH, Topology
+from generator.reading import read_limited
 
 OPEN_PARTS = 64
+
+IMAGE_FACTS = ["image_path", "image_sha256"]
+"""Columns of :func:`proven_image`, besides image where it is in the table."""
+
+MAX_IMAGE_BYTES = 1 << 28
+"""Of one encoded image: more than a PNG of the largest resolution there is."""
 
 
 def read_rows(
@@ -38,15 +48,19 @@ def read_rows(
     try:
         # A dataset keeps the footers of all its files, 100 kB each, so it is opened piece by piece.
         for start in range(0, len(parts), OPEN_PARTS):
-            paths = [str(root / part.path) for part in parts[start : start + OPEN_PARTS]]
+            paths = [str(dataset_file(root, part.path)) for part in parts[start : start + OPEN_PARTS]]
             data = ds.dataset(paths, format="parquet")
+            where_from = paths[0] if len(paths) == 1 else root
             today = todays_schema(data.schema, paths[0])
             if set(columns or today.names) <= set(data.schema.names):
-                yield from data.to_batches(columns=columns, filter=where, batch_size=BATCH)
+                for batch in data.to_batches(columns=columns, filter=where, batch_size=BATCH):
+                    check_texts(batch, where_from)
+                    yield batch
                 continue
             stored = [name for name in columns or today.names if name in data.schema.names]
             # Without any column a batch would not know how long it is.
             for batch in data.to_batches(columns=stored or ["sample_id"], filter=where, batch_size=BATCH):
+                check_texts(batch, where_from)
                 yield with_defaults(batch, today, columns or today.names)
     except (OSError, pa.ArrowException) as error:
         # The whole message on one line: its first sentence does not name the file.
@@ -96,14 +110,29 @@ def read_samples(root: Path, manifest: Manifest, sample_ids: Sequence[str]) -> d
 def image_bytes(root: Path, row: Mapping[str, Any]) -> bytes:
     """The encoded image of one row, from the table or from its file.
 
-    Raises DatasetError: the dataset was built without images, or the file is gone.
+    Raises DatasetError: the dataset was built without images, or the file is gone or lies elsewhere.
     """
     if row.get("image"):
         return row["image"]["bytes"]
     if not row["image_path"]:
         raise DatasetError(f"{root}: built with images = none; build with files or embedded to see them")
-    path = root / row["image_path"]
+    path = dataset_file(root, row["image_path"])
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DatasetError(f"{path}: cannot be read ({error.strerror}); see `headturn verify`") from error
+        return read_limited(path, MAX_IMAGE_BYTES)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DatasetError(f"{path}: cannot be read ({reason}); see `headturn verify`") from error
+
+
+def proven_image(root: Path, row: Mapping[str, Any], sample_id: str) -> bytes:
+    """As :func:`image_bytes`, and it is the image that was rendered. row: with :data:`IMAGE_FACTS`.
+
+    Raises DatasetError as well if its SHA-256 is not the row's.
+    """
+    image = image_bytes(root, row)
+    if hashlib.sha256(image).hexdigest() != row["image_sha256"]:
+        raise DatasetError(
+            f"{root}: the image of {printable(sample_id)} is not the one that was rendered (SHA-256 "
+            "differs); see `headturn verify`"
+        )
+    return image

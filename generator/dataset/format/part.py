@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import file_sha256, one_line, write_atomically, write_files
+from generator.dataset.format.guard import check_texts
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import check_name, image_mode
 from generator.dataset.format.unit_rows import UnitRows, unit_table
@@ -75,10 +76,17 @@ def iter_stored(path: Path) -> Iterator[pa.RecordBatch]:
         yield from file.iter_batches(batch_size=BATCH)
 
 
-def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
-    """As :func:`iter_stored`, with the defaults of columns that an older part lacks."""
-    schema = todays_schema(part_schema_of(path), str(path))
+def iter_checked(path: Path) -> Iterator[pa.RecordBatch]:
+    """As :func:`iter_stored`; raises DatasetError as well for names that are none."""
     for batch in iter_stored(path):
+        check_texts(batch, path)
+        yield batch
+
+
+def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
+    """As :func:`iter_checked`, with the defaults of columns that an older part lacks."""
+    schema = todays_schema(part_schema_of(path), str(path))
+    for batch in iter_checked(path):
         yield with_defaults(batch, schema)
 
 

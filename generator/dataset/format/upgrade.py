@@ -18,6 +18,7 @@ from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import write_atomically
 from generator.dataset.format.folders import folder_beside, share_files
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HEADS_FILE, read_heads, write_heads
 from generator.dataset.format.manifest import (
     MANIFEST_FILE,
@@ -28,7 +29,7 @@ from generator.dataset.format.manifest import (
 )
 from generator.dataset.format.part import (
     check_part,
-    iter_stored,
+    iter_checked,
     part_schema_of,
     part_writer,
     row_groups,
@@ -97,14 +98,15 @@ def _write(source: Path, work: Path, manifest: Manifest, reporter: Progress) -> 
 
 
 def _rewrite(source: Path, work: Path, part: PartInfo, manifest: Manifest) -> PartInfo:
-    stored = part_schema_of(source / part.path)
-    schema = todays_schema(stored, str(source / part.path))
+    file = dataset_file(source, part.path)
+    stored = part_schema_of(file)
+    schema = todays_schema(stored, str(file))
     digest = configuration_digest(common_values(manifest.configuration))
     schema = schema.with_metadata({**schema.metadata, b"headturn.configuration_digest": digest.encode()})
     then, now = [NO_ROWS], [NO_ROWS]
 
     def batches() -> Iterator[pa.RecordBatch]:
-        for batch in iter_stored(source / part.path):
+        for batch in iter_checked(file):
             then.append(content_digest(batch))
             new = with_defaults(batch, schema)
             now.append(content_digest(new))

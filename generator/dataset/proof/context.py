@@ -60,7 +60,7 @@ def planned_cameras(
 class RowContext:
     """Of one batch of a part.
 
-    split: the folder the part lies in. heads, poses: the tables.
+    split: the folder the part lies in. heads, poses: the tables, where there are any yet.
     anchors: float64 [heads, P, 3], at pose zero, frame C, mm; NaN where there is none.
     head_index, pose_index: int [N], the place of each row of the batch in heads and its plan, none below 0.
     measured: the largest values that checks came across, by name.
@@ -68,10 +68,10 @@ class RowContext:
 
     root: Path
     images: ImageMode
-    heads: Sequence[HeadRow]
-    poses: DatasetPoses
     anchors: np.ndarray
     expected_camera: ExpectedCamera
+    heads: Sequence[HeadRow] = ()
+    poses: DatasetPoses | None = None
     split: str = ""
     head_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
     pose_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))

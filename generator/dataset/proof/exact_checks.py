@@ -9,18 +9,19 @@ import numpy as np
 import pyarrow as pa
 
 from generator.dataset.format.anchors_table import HeadAnchors
-from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.heads_table import IDENTITY, HeadRow
 from generator.dataset.format.open import as_array
 from generator.dataset.format.row_cameras import RowCameras
 from generator.dataset.proof.context import RowContext
 from generator.dataset.proof.named import named
 from generator.geometry.rigid import fit_rotations
-from generator.geometry.rotation import geodesic_deg
+from generator.geometry.rotation import geodesic_deg, graphics_rotation
+from generator.landmarks.anchors import WEIGHTS_SUM
+from generator.landmarks.facing import levelling_problem
+from generator.landmarks.topology import Topology
 
 CLOSURE_DEG = 1e-6
 """How near the rigid fit must come to R_C, besides the rounding of float32."""
-
-WEIGHTS_SUM = 1e-9
 
 
 def anchor_problems(heads: Sequence[HeadRow], anchors: dict[tuple[str, str], HeadAnchors]) -> Iterator[str]:
@@ -43,6 +44,32 @@ def anchor_problems(heads: Sequence[HeadRow], anchors: dict[tuple[str, str], Hea
             )
         elif (np.abs(found.weights[~absent].sum(axis=1) - 1) > WEIGHTS_SUM).any():
             yield f"anchors.parquet: {head.subject}/{head.expression}: weights do not add up to 1"
+
+
+def levelling_problems(
+    heads: Sequence[HeadRow], anchors: dict[tuple[str, str], HeadAnchors], topology: Topology
+) -> Iterator[str]:
+    """Each subject's correction against the anchors of its heads: the same mean face was fitted to both.
+
+    Only of use where the dataset is of today's content version: another may have had another mean face.
+    """
+    subjects: dict[str, list[HeadRow]] = {}
+    for head in heads:
+        subjects.setdefault(head.subject, []).append(head)
+    for subject, rows in subjects.items():
+        first = rows[0]
+        if any((h.frame, h.correction) != (first.frame, first.correction) for h in rows):
+            yield f"heads.parquet: {subject} has more than one correction"
+            continue
+        levelled = np.reshape(first.correction if first.frame == "canonical" else IDENTITY, (3, 3))
+        turned = graphics_rotation(levelled)
+        points = [
+            anchors[h.subject, h.expression].points for h in rows if (h.subject, h.expression) in anchors
+        ]
+        own = [p @ turned for p in points if p.shape == (topology.count, 3)]  # row vectors: R^T x
+        problem = levelling_problem(first.frame, first.correction, first.correction_sd_deg, own, topology)
+        if problem:
+            yield f"heads.parquet: {subject}: {problem}"
 
 
 def exact_problems(batch: pa.RecordBatch, context: RowContext) -> list[str]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import add_digests, content_digest
 from generator.dataset.format.files import file_sha256
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest, parts_configuration
 from generator.dataset.format.open import as_array, dataset_topology
@@ -87,8 +88,9 @@ class PartChecker:
 
     def quick(self, part: PartInfo) -> PartFindings:
         """Size, footer and schema of a part, without reading its rows."""
-        found, path = PartFindings(rows=part.rows, digest=part.digest), self._root / part.path
+        found = PartFindings(rows=part.rows, digest=part.digest)
         try:
+            path = dataset_file(self._root, part.path)
             size = path.stat().st_size
             with reading(path):
                 footer = pq.read_metadata(path)
@@ -105,12 +107,14 @@ class PartChecker:
                 ],
             )
         found.add("schema", (f"{part.path}: {problem}" for problem in self._schema_problems(schema)))
+        found.add("part files", _other_heads(part, footer))
         return found
 
     def check(self, part: PartInfo) -> PartFindings:
         """Everything within a part: hash, schema, digest, and every row against the tables."""
-        found, path = PartFindings(), self._root / part.path
+        found = PartFindings()
         try:
+            path = dataset_file(self._root, part.path)
             if file_sha256(path) != part.sha256:
                 found.add(
                     "part hashes", [f"{part.path} was changed or damaged after the build (SHA-256 differs)"]
@@ -121,6 +125,7 @@ class PartChecker:
             if wrong:
                 return found
             rows, detected, digests = 0, 0, []
+            heads: set[tuple[str, str]] = set()
             today = todays_schema(stored, str(path))
             for batch in iter_stored(path):
                 if nulls := [name for name in batch.schema.names if _nulls(batch.column(name))]:
@@ -128,6 +133,8 @@ class PartChecker:
                     continue
                 rows += len(batch)
                 detected += int(as_array(batch, "detected").sum())
+                names = (batch.column(name).to_pylist() for name in ("subject", "expression"))
+                heads.update(zip(*names, strict=True))
                 with reading(path):
                     digests.append(content_digest(batch))
                 self._check_rows(with_defaults(batch, today), part, found)
@@ -137,6 +144,9 @@ class PartChecker:
         found.rows, found.digest = rows, add_digests(digests)
         if (rows, detected) != (part.rows, part.detected):
             found.add("part hashes", [f"{part.path} has {rows} rows, the manifest says {part.rows}"])
+        said = (part.subject, part.expression)
+        if said not in (heads.pop() if len(heads) == 1 else ("", ""), ("", "")):
+            found.add("part hashes", [f"{part.path} is not of {'/'.join(said)}, as the manifest says"])
         if found.digest != part.digest:
             found.add("digest", [f"{part.path} holds other values than the manifest says"])
         return found
@@ -180,6 +190,17 @@ class PartChecker:
             what = ", ".join(sorted(names)) or "their order"
             wrong.append(f"columns differ from schema {self._manifest.schema_version}: {what}")
         return wrong
+
+
+def _other_heads(part: PartInfo, footer: pq.FileMetaData) -> Iterator[str]:
+    """Rows of another head than the manifest says, as the smallest and largest names in the footer tell."""
+    at = {footer.schema.column(k).path: k for k in range(footer.num_columns)}
+    for name, said in (("subject", part.subject), ("expression", part.expression)):
+        for group in range(footer.num_row_groups if said and name in at else 0):
+            limits = footer.row_group(group).column(at[name]).statistics
+            if limits is not None and limits.has_min_max and {limits.min, limits.max} != {said}:
+                yield f"{part.path} is not of {said}, as the manifest says"
+                return
 
 
 def _nulls(column: pa.Array) -> bool:

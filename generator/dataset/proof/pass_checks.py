@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.open import as_array
 from generator.dataset.format.passes import passes_sha256, read_channels
 from generator.dataset.format.row_cameras import RowCameras
@@ -49,7 +50,7 @@ def pass_problems(batch: pa.RecordBatch, context: RowContext) -> Iterator[str]:
             yield f"{name}: passes_path {path!r} is not where its passes belong"
             continue
         try:
-            channels = read_channels(context.root / path)
+            channels = read_channels(dataset_file(context.root, path))
         except (DatasetError, UsageError) as error:
             yield str(error)
             continue

@@ -13,12 +13,14 @@ import pyarrow as pa
 
 from generator.dataset.format.columns import ROWS, SCHEMA_VERSION, columns_at
 from generator.dataset.format.files import file_sha256
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.open import as_array
 from generator.dataset.format.schema import image_path, sample_id
 from generator.dataset.proof.context import RowContext
 from generator.dataset.proof.exact_checks import exact_problems
 from generator.dataset.proof.named import named
 from generator.dataset.proof.pass_checks import pass_problems
+from generator.errors import DatasetError
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 from generator.plan.poses import ANGLES
 
@@ -29,6 +31,7 @@ RowCheck = Callable[[pa.RecordBatch, RowContext], Iterable[str]]
 
 def identity_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
     """Name, split, licence and place in the grid, against heads.parquet and poses.csv."""
+    assert context.poses is not None
     facts = (batch.column(n).to_pylist() for n in ("sample_id", "split", "head_license", "redistributable"))
     indices = np.stack([as_array(batch, f"{angle}_index") for angle in ANGLES], axis=-1)
     off = (indices != context.poses.indices(context.head_index, context.pose_index)).any(axis=1)
@@ -103,7 +106,10 @@ def image_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
                 yield f"{name}: image_path {path!r} is not where its image belongs"
                 continue
             try:
-                actual = file_sha256(root / path)
+                actual = file_sha256(dataset_file(root, path))
+            except DatasetError as error:
+                yield str(error)
+                continue
             except OSError as error:
                 yield f"{path}: {error.strerror}"
                 continue

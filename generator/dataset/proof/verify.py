@@ -14,16 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
+from generator.content import CONTENT, CONTENT_VERSION
 from generator.dataset.format.anchors_table import ANCHORS_SINCE, read_anchors
 from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.dataset_poses import read_dataset_poses
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import file_sha256
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import read_heads
-from generator.dataset.format.manifest import Manifest, read_manifest, side_tables
+from generator.dataset.format.manifest import Manifest, covered_files, read_manifest, side_tables
+from generator.dataset.format.open import dataset_topology
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer
-from generator.dataset.proof.exact_checks import anchor_problems
+from generator.dataset.proof.exact_checks import anchor_problems, levelling_problems
 from generator.dataset.proof.part_checks import PartChecker, PartFindings
 from generator.dataset.proof.row_checks import row_checks
 from generator.dataset.proof.verify_report import Check, VerifyReport
@@ -87,14 +90,20 @@ def verify_dataset(
         poses = read_dataset_poses(root, heads)
         anchors = read_anchors(root)
         tables = side_tables(manifest.schema_version)
-        changed = [name for name in tables if file_sha256(root / name) != manifest.tables.get(name)]
+        changed = [
+            name for name in tables if file_sha256(dataset_file(root, name)) != manifest.tables.get(name)
+        ]
         checker = PartChecker(root, manifest, heads, poses, anchors)
     except (OSError, HeadturnError) as error:
         checks["heads and poses"].add([str(error)])
         return report
     checks["heads and poses"].add(f"{name} was changed after the build (SHA-256 differs)" for name in changed)
+    checks["manifest"].add(_changed_files(root, manifest))
     if "anchors" in checks:
         checks["anchors"].add(anchor_problems(heads, anchors))
+        if manifest.versions.get(CONTENT) == str(CONTENT_VERSION):
+            topology = dataset_topology(root, manifest)
+            checks["anchors"].add(levelling_problems(heads, anchors, topology))
     for check in checks.values():
         check.done = True
     parts = _present_parts(root, manifest, checks["part files"])
@@ -138,6 +147,21 @@ def verify_dataset(
         rate_by_subject=tally.by_subject(),
         cells=tuple(tally.by_cell()),
     )
+
+
+def _changed_files(root: Path, manifest: Manifest) -> Iterator[str]:
+    """The small files beside the tables that are not those of the build."""
+    if not manifest.files:  # written before they were covered
+        return
+    try:
+        now = covered_files(root)
+    except (OSError, DatasetError) as error:
+        yield str(error)
+        return
+    for name in sorted({*now, *manifest.files}):
+        if now.get(name) != manifest.files.get(name):
+            what = "is missing" if name not in now else "was changed, or added, after the build"
+            yield f"{name} {what}"
 
 
 def _present_parts(root: Path, manifest: Manifest, check: Check) -> list[PartInfo]:

@@ -33,8 +33,8 @@ def carry_over(orders: Iterable[BuildOrder], root: Path, receipts: Receipts) -> 
         if not order.earlier_units or (root / order.part_path).exists():
             continue
         for earlier in order.earlier_paths:
-            if part := receipts.valid_part(earlier, len(order.views)):
-                receipts.add(_renamed(order, part, root))
+            if part := receipts.valid_part(earlier, order):
+                receipts.add(_renamed(order, part, root), order)
                 carried += 1
                 break
     return carried

@@ -10,8 +10,9 @@ from pathlib import Path, PurePosixPath
 
 from generator.dataset.format.anchors_table import ANCHORS_FILE
 from generator.dataset.format.files import write_bytes
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HEADS_FILE
-from generator.dataset.format.manifest import MANIFEST_FILE
+from generator.dataset.format.manifest import CONFIG_FILE, FAILURES_FILE, MANIFEST_FILE
 from generator.dataset.format.open import read_rows
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.show.card import CARD_FILE
@@ -27,7 +28,6 @@ from generator.plan.pose_plans import POSES_FILE, HeadName, PosePlans, is_drawn,
 from generator.plan.poses import pose_name
 from generator.plan.settings import all_settings
 
-CONFIG_FILE, FAILURES_FILE = "config.toml", "failures.jsonl"
 MADE_HEADS = "heads"
 SHEET_FILE, ANCHOR_SHEET_FILE, MAP_FILE = "contact_sheet.png", "anchors.png", "detection_rate.png"
 
@@ -51,6 +51,8 @@ def claim(root: Path) -> None:
         raise DatasetError(f"{root}: cannot write there ({error.strerror}); choose another --out") from error
     if not ours:
         raise DatasetError(f"{root} is not empty and not a Headturn dataset; choose another --out")
+    for name in WRITTEN:
+        dataset_file(root, name)  # through a link a build would write, and delete, elsewhere
 
 
 def as_begun(config: BuildConfig, root: Path) -> tuple[BuildConfig, bool]:
@@ -173,7 +175,7 @@ def drop(stale: Iterable[str], root: Path, heads: Iterable[HeadName], plans: Pos
         for file in _files_of(root, path):
             _, subject, expression, name = file.parts
             if name.removesuffix(file.suffix) not in kept.get((subject, expression), ()):
-                (root / file).unlink(missing_ok=True)
+                dataset_file(root, file.as_posix()).unlink(missing_ok=True)
         (root / path).unlink()
 
 

@@ -3,19 +3,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from generator import registries
 from generator.content import deciding
 from generator.dataset.format.files import append_line
-from generator.errors import WorkerError
+from generator.errors import DatasetError, HeadturnError, WorkerError
 from generator.execution.executors.executor import Executor
 from generator.execution.lanes.slot import Outcome
+from generator.heads.units import MM_PER_UNIT, axes_rotation
+from generator.landmarks.facing import levelling_problem
 from generator.messages import Placed, PlaceOrder, Versions, VersionsOrder, expect, from_json, to_json
 from generator.plan.settings import Landmarks
+from generator.sealed import read_sealed_lines, sealed_line
 
 PLACED_FILE = "placed.jsonl"
 FIRST_PLACED_FILE = "prepared.jsonl"
@@ -34,7 +38,9 @@ def lane_versions(executor: Executor, landmarks: Landmarks) -> dict[str, str]:
 
 
 class PlacedHeads:
-    """Receipts of place orders, one JSON line each, known by what they depend on.
+    """Receipts of place orders, one sealed JSON line each, known by what they depend on.
+
+    A line that contradicts itself or its order is as good as none: that subject is looked at again.
 
     versions: of :func:`lane_versions`. file_sha256: of every file of every head, by its path.
     """
@@ -52,7 +58,7 @@ class PlacedHeads:
         unknown = []
         for order in orders:
             receipt = self._known.get(self._key(order))
-            if receipt is None:
+            if receipt is None or _problem(receipt, order):
                 unknown.append(order)
             else:
                 yield Outcome(order, receipt)
@@ -62,7 +68,7 @@ class PlacedHeads:
                     "key": self._key(expect(PlaceOrder, outcome.order)),
                     "receipt": to_json(outcome.receipt),
                 }
-                append_line(self._path, json.dumps(line))
+                append_line(self._path, sealed_line(line))
             yield outcome
 
     def _key(self, order: PlaceOrder) -> str:
@@ -74,11 +80,34 @@ class PlacedHeads:
 
 def _read(path: Path) -> dict[str, Placed]:
     known: dict[str, Placed] = {}
-    if path.exists():
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                record: dict[str, Any] = json.loads(line)
+    try:
+        for record in read_sealed_lines(path):
+            with contextlib.suppress(ValueError, KeyError, TypeError):  # of another version: looked at again
                 known[record["key"]] = expect(Placed, from_json(record["receipt"]))
-            except (ValueError, KeyError, TypeError, AttributeError):
-                continue  # cut short by a crash: that head is looked at again
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path}: cannot be read ({error}); delete it and run the build again") from error
     return known
+
+
+def _problem(placed: Placed, order: PlaceOrder) -> str:
+    """Why what was found before cannot be so, or "": a file in the dataset's folder is not believed."""
+    placement = placed.placement
+    if len(placed.facts) != len(order.heads) or placement.frame != order.frame:
+        return "it is about other heads"
+    if MM_PER_UNIT.get(placement.units) != placement.mm_per_unit:
+        return f"{placement.mm_per_unit!r} mm are not in one {placement.units}"
+    try:
+        axes_rotation(placement.up, placement.forward)
+    except (HeadturnError, ValueError) as error:
+        return str(error)
+    topology = registries.DETECTORS.get(order.landmarks.detector).topology
+    anchors = [fact.anchors for fact in placed.facts if fact.anchors is not None]
+    if wrong := next((problem for found in anchors if (problem := found.contradiction(topology))), ""):
+        return wrong
+    return levelling_problem(
+        placement.frame,
+        placement.correction,
+        placement.correction_sd_deg,
+        [found.points for found in anchors],
+        topology,
+    )

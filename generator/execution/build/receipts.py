@@ -3,48 +3,61 @@
 
 from __future__ import annotations
 
-import json
+import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+from generator.codec import from_plain
 from generator.dataset.format.files import append_line, write_bytes
 from generator.dataset.format.part import PartInfo, check_part
 from generator.errors import DatasetError
+from generator.execution.build.unit_check import check_unit, unit_files
 from generator.messages import BuildOrder
+from generator.sealed import read_sealed_lines, sealed_line
 
 RECEIPTS_FILE = "receipts.jsonl"
 
+Stamp = list[Any]
+"""Size and time of change of a part, and one digest of those of its images and passes."""
+
 
 class Receipts:
-    """What is known of the parts of a dataset in the making, one JSON line a part.
+    """What is known of the parts of a dataset in the making, one sealed JSON line a part.
 
-    A part whose size and time of change are those of its receipt is not read
-    again. One without a receipt, or one that changed, is read from the first byte
-    to the last, so losing the file costs time and nothing else.
+    A part that is, with its images, of the size and the time of change of its receipt is not
+    read again. One without a receipt, or one that changed, is read from the first byte to the
+    last and compared with its order, so losing the file costs time and nothing else.
+
+    refused: why parts that are there cannot stay, by their path.
+    Raises DatasetError if the file is there and cannot be read.
     """
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self._path = root / RECEIPTS_FILE
-        self._known = _read(self._path)
+        self._known = dict(_read(self._path))
+        self.refused: dict[str, str] = {}
 
-    def valid_part(self, path: str, rows: int) -> PartInfo | None:
-        """The part at path (relative to the dataset) if it is whole and has so many rows, else None."""
-        file = self._root / path
-        try:
-            stamp = _stamp(file)
-        except FileNotFoundError:
+    def valid_part(self, path: str, order: BuildOrder) -> PartInfo | None:
+        """The part at path (relative to the dataset) if it is what the order would make, else None."""
+        if not (self._root / path).exists():
             return None
         part, known_stamp = self._known.get(path, (None, None))
+        stamp = self._stamp(path, order)
         if part is None or known_stamp != stamp:
             try:
-                part = check_part(file)
-            except DatasetError:
+                part = check_unit(self._root, path, order)
+            except DatasetError as error:
+                self.refused[path] = str(error)
                 return None
             self._known[path] = part, stamp
-        return part if part.rows == rows else None
+        if part.rows != len(order.views):
+            self.refused[path] = f"{path}: has {part.rows} rows, expected {len(order.views)}"
+            return None
+        return part
 
     def head_of(self, path: str) -> tuple[str, str] | None:
         """(subject, expression) of a part, None if it cannot be read. One without a receipt is read."""
@@ -56,9 +69,9 @@ class Receipts:
                 return None
         return part.subject, part.expression
 
-    def add(self, part: PartInfo) -> None:
+    def add(self, part: PartInfo, order: BuildOrder) -> None:
         """Note a part that was just committed. Raises DatasetError if that cannot be written."""
-        self._known[part.path] = part, _stamp(self._root / part.path)
+        self._known[part.path] = part, self._stamp(part.path, order)
         append_line(self._path, self._line(part.path))
 
     def keep(self, paths: Iterable[str]) -> None:
@@ -67,7 +80,18 @@ class Receipts:
 
     def _line(self, path: str) -> str:
         part, stamp = self._known[path]
-        return json.dumps({"part": asdict(part), "stamp": stamp})
+        return sealed_line({"part": asdict(part), "stamp": stamp})
+
+    def _stamp(self, path: str, order: BuildOrder) -> Stamp:
+        status = os.stat(self._root / path)
+        files = hashlib.sha256()
+        for file in unit_files(order):
+            try:
+                of = os.stat(self._root / file)
+            except FileNotFoundError:
+                return []  # no receipt has this one: the part is read, which says what is missing
+            files.update(f"{of.st_size} {of.st_mtime_ns}\n".encode())
+        return [status.st_size, status.st_mtime_ns, files.hexdigest()]
 
 
 def split_done(orders: Sequence[BuildOrder], receipts: Receipts) -> tuple[list[PartInfo], list[BuildOrder]]:
@@ -75,7 +99,7 @@ def split_done(orders: Sequence[BuildOrder], receipts: Receipts) -> tuple[list[P
     done: list[PartInfo] = []
     todo: list[BuildOrder] = []
     for order in orders:
-        part = receipts.valid_part(order.part_path, len(order.views))
+        part = receipts.valid_part(order.part_path, order)
         if part is None:
             todo.append(order)
         else:
@@ -84,19 +108,10 @@ def split_done(orders: Sequence[BuildOrder], receipts: Receipts) -> tuple[list[P
     return done, todo
 
 
-def _read(path: Path) -> dict[str, tuple[PartInfo, list[int]]]:
-    known = {}
-    if path.exists():
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                record = json.loads(line)
-                part = PartInfo(**record["part"])
-                known[part.path] = part, record["stamp"]
-            except (ValueError, KeyError, TypeError):
-                continue  # cut short by a crash: that part is read instead
-    return known
-
-
-def _stamp(path: Path) -> list[int]:
-    status = os.stat(path)
-    return [status.st_size, status.st_mtime_ns]
+def _read(path: Path) -> Iterator[tuple[str, tuple[PartInfo, Stamp]]]:
+    try:
+        for record in read_sealed_lines(path):
+            part = from_plain(PartInfo, record["part"])
+            yield part.path, (part, record["stamp"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DatasetError(f"{path}: cannot be read ({error}); delete it and run the build again") from error

@@ -150,6 +150,8 @@ def _build(
     drop(stale, root, heads, poses.plans)
     write_poses(poses.plans, root)
     done, todo = split_done(orders, receipts)
+    for reason in receipts.refused.values():
+        reporter.note(f"rendered again: {reason}")
     if done:
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")
 
@@ -207,7 +209,7 @@ def run_units(
             continue
         built = expect(Built, outcome.receipt)
         part = built.part
-        receipts.add(part)
+        receipts.add(part, order)
         parts.append(part)
         spent = {stage: round(value, 3) for stage, value in built.seconds.items()}
         reporter.event("unit", {**facts, "detected": part.detected, "seconds": spent})

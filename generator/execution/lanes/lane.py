@@ -24,7 +24,7 @@ from generator.content import content_versions
 from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
-from generator.errors import WorkerError
+from generator.errors import HeadError, WorkerError
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.renderer import Renderer
 from generator.heads.head import Head
@@ -152,6 +152,11 @@ class Lane:
         with _timed(seconds, "load"):
             package = self._package(order.head, order.placement)
         with _timed(seconds, "visibility"):
+            if off := self._surface.off(order.anchors):
+                raise HeadError(
+                    f"{order.head.mesh_path}: {off} of its anchors are not on its surface: what an earlier "
+                    "run noted about it was changed; delete placed.jsonl and run the build again"
+                )
             visible = self._surface.visible(order.anchors, views)
         topology = detector.topology
         landmarks = np.full((len(views), topology.count, 3), np.nan, dtype=np.float32)
