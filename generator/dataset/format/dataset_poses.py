@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.open import as_array
 from generator.errors import DatasetError
@@ -144,4 +145,4 @@ class _Finder:
 
 def read_dataset_poses(root: Path, heads: Sequence[HeadRow]) -> DatasetPoses:
     """The poses of a dataset. Raises DatasetError: poses.csv is missing, damaged, or lacks a head."""
-    return DatasetPoses(heads, read_pose_plans(root / POSES_FILE))
+    return DatasetPoses(heads, read_pose_plans(dataset_file(root, POSES_FILE)))
