@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -250,3 +251,33 @@ def test_a_failed_write_leaves_no_head(monkeypatch: pytest.MonkeyPatch, tmp_path
     monkeypatch.undo()
     assert make_heads(tmp_path, count=1, seed=0) == [tmp_path / "s0p0000"]
     assert [path.name for path in tmp_path.iterdir()] == ["s0p0000"]
+
+
+@pytest.mark.parametrize("name", ["neutral.obj", "skin.png", "head.mtl", "head.json"])
+def test_a_head_that_was_changed_is_made_again(parametric_heads: Path, tmp_path: Path, name: str) -> None:
+    out = tmp_path / "heads"
+    shutil.copytree(parametric_heads, out)
+    changed, other = sorted(out.iterdir())
+    before, kept = tree(changed), (other / "head.json").stat().st_mtime_ns
+    content = bytearray((changed / name).read_bytes())
+    content[len(content) // 2] ^= 1
+    (changed / name).write_bytes(content)
+    make_heads(out, count=2, seed=1, keep=True)
+    assert tree(changed) == before
+    assert (other / "head.json").stat().st_mtime_ns == kept, "and the other is not"
+
+
+def test_heads_of_the_first_release_stay(parametric_heads: Path, tmp_path: Path) -> None:
+    out = tmp_path / "heads"
+    shutil.copytree(parametric_heads, out)
+    for card in out.glob("*/head.json"):
+        about = json.loads(card.read_text())
+        card.write_text(json.dumps({k: v for k, v in about.items() if k not in ("files", "sha256")}))
+    before = tree(out)
+    make_heads(out, count=2, seed=1, keep=True)
+    assert tree(out) == before
+
+
+def tree(folder: Path) -> dict[Path, bytes]:
+    """Every file's bytes."""
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

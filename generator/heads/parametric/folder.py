@@ -13,6 +13,7 @@ from PIL import Image
 from generator.heads.parametric.curtain import curtain_topology
 from generator.heads.parametric.eyes import eyeball_topology
 from generator.heads.parametric.template import PARTS, head_template
+from generator.sealed import sealed
 
 MATERIAL_FILE = "head.mtl"
 _MATERIALS = """\
@@ -50,8 +51,8 @@ def write_texture(path: Path, pixels: np.ndarray) -> None:
 
 
 def write_description(path: Path, description: dict) -> None:
-    """Write head.json."""
-    path.write_text(json.dumps(description, indent=1) + "\n", encoding="utf-8", newline="\n")
+    """Write head.json, with a checksum of itself."""
+    path.write_text(json.dumps(sealed(description), indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def head_triangles(long_hair: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError, UsageError
+from generator.heads.card import CARD_NAME, MAX_CARD_BYTES
 from generator.heads.head import NEUTRAL, Made, Maker, Wish
 from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
 from generator.heads.parametric.compose import HeadShape, head_shape, head_vertices
@@ -22,12 +24,17 @@ from generator.heads.parametric.folder import write_description, write_materials
 from generator.heads.parametric.identity import Identity, sample_identity
 from generator.heads.parametric.skin import paint_skin
 from generator.heads.parametric.source import data_folder
+from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
+from generator.sealed import SEAL, unsealed
 
 LICENSE = "CC0-1.0"
 ATTRIBUTION = (
     "Made by Headturn from MakeHuman's CC0 base mesh and targets (MakeHuman team) "
     "and the CC0 face units of Mika Suominen"
 )
+FILES = "files"
+"""Of head.json: SHA-256 of every file beside it."""
+
 _HEAD_NAME = re.compile(r"s\d+p\d{4,}")
 
 
@@ -45,7 +52,7 @@ def make_heads(
     Head k of a seed is the same whatever count is, and so is expression j of a
     head whatever expressions is. A folder is complete or absent: each is written
     beside its place and renamed. Folders that are already there are replaced,
-    or kept if they hold the expressions asked for and keep is set.
+    or kept if keep is set, they hold the expressions asked for, and their files are as they were made.
 
     Parameters
     ----------
@@ -70,9 +77,8 @@ def make_heads(
     folders = []
     for index in range(count):
         folder = out / head_name(seed, index)
-        wanted = folder / f"{expression_name(expressions) if expressions else NEUTRAL}.obj"
         try:
-            if not (keep and wanted.is_file()):
+            if not (keep and _is_whole(folder, expression_name(expressions) if expressions else NEUTRAL)):
                 _write_head(folder, seed, index, expressions)
         except OSError as error:
             reason = f"cannot be written ({error.strerror}); check space and permissions"
@@ -120,8 +126,9 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
     write_texture(work / "eye.png", paint_eye(appearance, paint))
     if long_hair:
         write_texture(work / "hair.png", paint_curtain(appearance, paint))
+    made = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(work.iterdir())}
     write_description(
-        work / "head.json",
+        work / CARD_NAME,
         {
             "source": "parametric",
             "subject": folder.name,
@@ -139,11 +146,32 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
                 "identity": asdict(identity),
                 "appearance": asdict(appearance),
             },
+            FILES: made,
         },
     )
     if folder.exists():
         shutil.rmtree(folder)
     work.rename(folder)
+
+
+def _is_whole(folder: Path, last: str) -> bool:
+    """Does a folder hold the expressions up to one of this name, all as they were made?
+
+    Heads of the first release have no checksums: what is there of them is taken.
+    """
+    if not (folder / f"{last}.obj").is_file():
+        return False
+    try:
+        card = parse_json(read_limited(folder / CARD_NAME, MAX_CARD_BYTES))
+        if FILES not in card and SEAL not in card:
+            return True
+        made: dict[str, str] = unsealed(card)[FILES]
+        return all(
+            hashlib.sha256(read_limited(folder / name, MAX_STATE_BYTES)).hexdigest() == sha256
+            for name, sha256 in made.items()
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False  # made again, and the same
 
 
 def _describe_expression(mesh: str, expression: Expression) -> dict:
