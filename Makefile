@@ -48,9 +48,11 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-# 200 kills of hosts and workers at random moments, instead of the 30 of every test run.
+# 200 kills of hosts and workers at random moments, and 200 flipped bits in any file of a finished dataset
+# and of an unfinished build, instead of the 30 and 24 of every test run.
 soak: $(VENV)/.dev
-	HEADTURN_KILLS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 tests/execution/test_faults.py -k killed
+	HEADTURN_KILLS=200 HEADTURN_FLIPS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 \
+		tests/execution/test_flips.py tests/execution/test_faults.py -k "killed or flips"
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/build.py
