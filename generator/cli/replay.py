@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +27,7 @@ def replay(
     from generator.execution.replay import replay_sample
 
     found = replay_sample(folder, sample_id, heads=heads, picture=picture, blender=blender)
-    typer.echo(json.dumps(asdict(found), indent=1) if as_json else found.text())
+    typer.echo(json.dumps(found.as_dict(), indent=1) if as_json else found.text())
     if not found.same:
         raise typer.Exit(1)
 

@@ -1,54 +1,84 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render one sample of a finished dataset again, the way it was built, and compare."""
+"""Render samples of a finished dataset again, the way they were built, and compare."""
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from generator.dataset.format.anchors_table import read_anchors
-from generator.dataset.format.files import file_sha256, write_bytes
-from generator.dataset.format.heads_table import HeadRow, read_heads
-from generator.dataset.format.manifest import Manifest, read_manifest
-from generator.dataset.format.open import image_bytes, read_samples
+from generator.dataset.format.files import write_bytes
+from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.manifest import read_manifest
+from generator.dataset.format.open import dataset_topology, image_bytes, read_samples
 from generator.dataset.format.part import read_part
 from generator.dataset.proof.compare import row_differences
-from generator.errors import DatasetError, HeadError, UsageError, WorkerError
-from generator.execution.build.sources import source_path
+from generator.dataset.proof.context import known_config
+from generator.dataset.proof.stored import Stored, read_stored
+from generator.errors import HeadturnError, UsageError, WorkerError
 from generator.execution.build.units import build_order
+from generator.execution.executors.executor import Executor
 from generator.execution.executors.open import open_executor
 from generator.execution.lanes.scratch import scratch_folder
+from generator.execution.lanes.slot import Outcome
+from generator.execution.recorded_heads import RecordedHeads
 from generator.heads.head import Head
 from generator.heads.placement import Placement
-from generator.heads.source import find_heads
-from generator.messages import BuildOrder, Built, expect
-from generator.plan.config import BuildConfig, recorded_config
+from generator.messages import BuildOrder, Built, VersionsOrder, expect
+from generator.plan.config import BuildConfig
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Pose
+
+Row = Mapping[str, Any]
+
+WINDOW = 256
+"""Rows that are read, rendered and compared at a time; bounds the memory of a replay of all of them."""
+
+VIEWS = 8
+"""Rows of one head in one order."""
 
 
 @dataclass(frozen=True)
 class Replay:
     """What came out the second time.
 
-    same: image, passes, detection and landmarks are the recorded ones, bit by bit.
+    same: image, passes, detection and landmarks are the recorded ones, bit by bit, and so are the files.
     differences: a line each. versions: what ran then and now, where it is not the same.
+    compared: which files, hashes and images. decoded: a stored image is one, of the right kind and size.
+    not_rendered: why only the files were looked at, and nothing rendered.
     """
 
     sample_id: str
     same: bool
     differences: tuple[str, ...]
-    versions: tuple[str, ...]
+    versions: tuple[str, ...] = ()
+    compared: str = ""
+    decoded: bool = False
+    not_rendered: HeadturnError | None = None
 
     def text(self) -> str:
         """For people."""
         if self.same:
-            return f"{self.sample_id}: the same image, landmarks and labels, bit by bit"
+            return f"{self.sample_id}: the same image, landmarks and labels, bit by bit\n{self.compared}"
         return "\n".join([f"{self.sample_id}: not the same", *self.differences, *self.versions])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "sample_id": self.sample_id,
+            "same": self.same,
+            "differences": self.differences,
+            "versions": self.versions,
+            "compared": self.compared,
+        }
 
 
 def replay_sample(
@@ -71,75 +101,160 @@ def replay_sample(
     UsageError: there is no such sample. HeadError: the head's files are gone or
     were changed. DatasetError: the dataset cannot be read.
     """
-    manifest = read_manifest(root)
-    recorded = read_samples(root, manifest, [sample_id]).get(sample_id)
-    if recorded is None:
-        example = next(iter(manifest.parts)).subject or "subject"
-        raise UsageError(
-            f"{root}: no sample {sample_id!r}; names are like {example}/neutral/y+30_p-10_r+0, "
-            "see the column sample_id"
-        )
-    config = recorded_config(manifest.configuration, root)
-    subject, expression = recorded["subject"], recorded["expression"]
-    row = next(h for h in read_heads(root) if (h.subject, h.expression) == (subject, expression))
-    head = _find(row, config, root, heads)
-    anchors = read_anchors(root)[subject, expression]
-    with open_executor("local", workers=1, blender=blender) as lanes, scratch_folder() as scratch:
-        order = _order(row, head, anchors.points, config, recorded, scratch)
-        [outcome] = lanes.run([order], lambda: None)
-        if outcome.receipt is None:
-            raise WorkerError(f"{sample_id}: cannot be rendered again: {outcome.error}")
-        built = expect(Built, outcome.receipt)
-        again = read_part(scratch / built.part.path)
-        now = again.to_pylist()[0]
-        image = image_bytes(scratch, now)
+
+    def keep(_: str, image: bytes) -> None:
         if picture is not None:
             write_bytes(picture, image)
-        differences = row_differences(recorded, now, lambda: _image_detail(recorded, image, root, manifest))
-    versions = [
-        f"{name}: {manifest.versions.get(name, 'none')} then, {now} now"
-        for name, now in built.versions.items()
-        if manifest.versions.get(name) != now
-    ]
-    return Replay(sample_id, not differences, tuple(differences), tuple(versions))
 
-
-def _find(row: HeadRow, config: BuildConfig, root: Path, moved: Path | None) -> Head:
-    """The head of a row, its files checked against the hashes of the build."""
-    wanted = config.heads
-    path = moved or source_path(config, root)
-    again = "give the place it was moved to with --heads, or put it back"
-    if not path.exists():
-        raise HeadError(f"{path}: the heads of this dataset are not there any more; {again}")
-    base = path if path.is_dir() else path.parent
-    for name, sha256 in row.file_sha256:
-        if not (base / name).is_file():
-            raise HeadError(f"{base / name}: a file of {row.subject}/{row.expression} is gone; {again}")
-        if file_sha256(base / name) != sha256:
-            raise HeadError(
-                f"{base / name}: was changed after the build (SHA-256 differs); replay needs the "
-                "file as it was"
-            )
-    source = find_heads(
-        path,
-        expressions=wanted.expressions,
-        license=wanted.license,
-        redistributable=wanted.redistributable,
-        units=wanted.units,
-        up=wanted.up,
-        forward=wanted.forward,
+    found = [*replay_samples(root, [sample_id], heads=heads, blender=blender, workers=1, on_render=keep)]
+    if found:
+        if found[0].not_rendered is not None:
+            raise found[0].not_rendered
+        return found[0]
+    example = next(iter(read_manifest(root).parts)).subject or "subject"
+    raise UsageError(
+        f"{root}: no sample {sample_id!r}; names are like {example}/neutral/y+30_p-10_r+0, "
+        "see the column sample_id"
     )
-    for head in source.heads:
-        if (head.subject, head.expression) == (row.subject, row.expression):
-            return head
-    raise HeadError(f"{path}: no head {row.subject}/{row.expression} there any more; {again}")
 
 
-def _order(
-    row: HeadRow, head: Head, points: np.ndarray, config: BuildConfig, recorded: dict[str, Any], root: Path
-) -> BuildOrder:
-    """The build order of one pose, with what placing the head found at the time."""
-    placement = Placement(
+def replay_samples(
+    root: Path,
+    sample_ids: Iterable[str],
+    *,
+    heads: Path | None = None,
+    blender: str | None = None,
+    workers: int | None = None,
+    on_image: Callable[[], None] = lambda: None,
+    on_render: Callable[[str, bytes], None] = lambda name, image: None,
+) -> Iterator[Replay]:
+    """Build rows again, all in the same lanes; see :func:`replay_sample`.
+
+    sample_ids: best head by head. Those that are not in the dataset are left out.
+    workers: lanes, default one a core. on_image: called after each, from any thread; on_render: with the
+        name and the new image of each.
+    What keeps a row, or all of them, from being rendered is said in Replay.not_rendered.
+
+    Raises
+    ------
+    DatasetError: the dataset cannot be read.
+    """
+    manifest = read_manifest(root)
+    names = iter(sample_ids)
+    with ExitStack() as stack:
+        studio: _Studio | None = None
+        while window := list(islice(names, WINDOW)):
+            rows = read_samples(root, manifest, window)
+            if not rows:
+                continue
+            if studio is None:  # nothing is started for rows that are not there
+                studio = _Studio(stack, root, heads, blender, workers)
+            yield from studio.replay([rows[name] for name in window if name in rows], on_image, on_render)
+
+
+class _Studio:
+    """The tables of a dataset, and the lanes in which its rows are rendered again."""
+
+    def __init__(
+        self, stack: ExitStack, root: Path, moved: Path | None, blender: str | None, workers: int | None
+    ) -> None:
+        self._root, self._manifest = root, read_manifest(root)
+        self._config = known_config(self._manifest, root)
+        self._heads = RecordedHeads(root, self._config, moved)
+        self._anchors = read_anchors(root)
+        self._points = dataset_topology(root, self._manifest).count
+        self._scratch = stack.enter_context(scratch_folder())
+        self._lanes = cache(lambda: _open_lanes(stack, self._config, blender, workers))
+
+    def replay(
+        self, rows: Sequence[Row], on_image: Callable[[], None], on_render: Callable[[str, bytes], None]
+    ) -> Iterator[Replay]:
+        """Those of some rows, in their order."""
+        found: dict[str, Replay] = {}
+        orders: dict[str, tuple[BuildOrder, list[Row]]] = {}
+        for key, group in groupby(rows, key=lambda row: (row["subject"], row["expression"])):
+            together = list(group)
+            try:
+                head = self._heads.of(key)
+                if isinstance(closed := self._lanes(), HeadturnError):
+                    raise closed
+            except HeadturnError as error:
+                found.update((row["sample_id"], self._looked_at(row, error)) for row in together)
+                continue
+            for start in range(0, len(together), VIEWS):
+                some = together[start : start + VIEWS]
+                order = self._order(key, head, some, f"again{len(orders)}")
+                orders[order.unit] = order, some
+        outcomes: Iterable[Outcome] = ()
+        if orders and not isinstance(lanes := self._lanes(), HeadturnError):
+            outcomes = lanes.run([order for order, _ in orders.values()], on_image)
+        for outcome in outcomes:
+            order, some = orders[expect(BuildOrder, outcome.order).unit]
+            folder = Path(order.root)
+            if outcome.receipt is None:
+                name = order.head.name
+                why = WorkerError(f"{name}: cannot be rendered again: {outcome.error}", outcome.log)
+                found.update((row["sample_id"], self._looked_at(row, why)) for row in some)
+            else:
+                built = expect(Built, outcome.receipt)
+                again = read_part(folder / built.part.path).to_pylist()
+                for row, now in zip(some, again, strict=True):
+                    image = image_bytes(folder, now)
+                    on_render(row["sample_id"], image)
+                    found[row["sample_id"]] = self._compared(row, now, image, built.versions)
+            shutil.rmtree(folder, ignore_errors=True)
+        for row in rows:
+            yield found[row["sample_id"]]
+
+    def _order(self, key: tuple[str, str], head: Head, rows: Sequence[Row], unit: str) -> BuildOrder:
+        """The build order of some poses of a head, with what placing it found at the time."""
+        row, config = self._heads.rows[key], self._config
+        anchors = self._anchors.get(key)
+        points = np.full((self._points, 3), np.nan) if anchors is None else anchors.points
+        poses: list[Pose] = [(r["yaw_deg"], r["pitch_deg"], r["roll_deg"]) for r in rows]
+        indices = tuple((r["yaw_index"], r["pitch_index"], r["roll_index"]) for r in rows)
+        views = plan_views(config, head.name, row.radius_mm, poses)
+        root = self._scratch / unit
+        order = build_order(head, _placement(row), points, row.split, views, indices, config, root)
+        return replace(order, unit=unit, images="embedded")
+
+    def _stored(self, row: Row) -> Stored:
+        return read_stored(self._root, row, self._manifest.images, self._config.dataset)
+
+    def _looked_at(self, row: Row, why: HeadturnError) -> Replay:
+        stored = self._stored(row)
+        return Replay(
+            row["sample_id"], False, tuple(stored.problems), decoded=stored.decoded, not_rendered=why
+        )
+
+    def _compared(self, row: Row, now: Row, image: bytes, versions: Mapping[str, str]) -> Replay:
+        stored, recorded = self._stored(row), self._manifest.versions
+        differences = [*stored.problems, *row_differences(row, now, stored.files(image, row))]
+        changed = [
+            f"{name}: {recorded.get(name, 'none')} then, {version} now"
+            for name, version in versions.items()
+            if recorded.get(name) != version
+        ]
+        name, same = row["sample_id"], not differences
+        return Replay(name, same, tuple(differences), tuple(changed), stored.compared(), stored.decoded)
+
+
+def _open_lanes(
+    stack: ExitStack, config: BuildConfig, blender: str | None, workers: int | None
+) -> Executor | HeadturnError:
+    """Lanes that answer, or why there are none here."""
+    try:
+        lanes = stack.enter_context(open_executor("local", workers=workers, blender=blender))
+    except UsageError as error:  # no Blender
+        return error
+    [outcome] = lanes.run([VersionsOrder(config.landmarks)], lambda: None)
+    if outcome.receipt is None:
+        return WorkerError(f"nothing can be rendered here: {outcome.error}", outcome.log)
+    return lanes
+
+
+def _placement(row: HeadRow) -> Placement:
+    return Placement(
         units=row.units,
         mm_per_unit=row.mm_per_unit,
         up=row.up,
@@ -151,25 +266,3 @@ def _order(
         correction=row.correction,
         correction_sd_deg=row.correction_sd_deg,
     )
-    pose: Pose = (recorded["yaw_deg"], recorded["pitch_deg"], recorded["roll_deg"])
-    views = plan_views(config, head.name, row.radius_mm, [pose])
-    indices = (recorded["yaw_index"], recorded["pitch_index"], recorded["roll_index"])
-    order = build_order(head, placement, points, row.split, views, (indices,), config, root)
-    return replace(order, unit="again", images="embedded")
-
-
-def _image_detail(recorded: dict[str, Any], image: bytes, root: Path, manifest: Manifest) -> str:
-    """How far two images are apart; "" where the first was not kept."""
-    if manifest.images == "none":
-        return ""
-    then = _decode(image_bytes(root, recorded))
-    difference = np.abs(_decode(image).astype(int) - then.astype(int))
-    share = (difference.max(axis=2) > 0).mean()
-    return f": up to {difference.max()} of 255 levels, on {share:.2%} of its pixels"
-
-
-def _decode(image: bytes) -> np.ndarray:
-    pixels = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise DatasetError("an image of the dataset cannot be decoded; see `headturn verify`")
-    return pixels

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from dry_build import DryBuild
+from replaying import Lanes
 from small_builds import close_lanes, config_for, run
 
 from generator.plan.config import BuildConfig
@@ -29,6 +30,15 @@ def dry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DryBuild:
     """Two heads and a folder where nothing is built yet; without the map, which takes most of the time."""
     monkeypatch.setattr("generator.execution.build.run.detection_map", lambda root, manifest, file: file)
     return DryBuild(tmp_path, "amy", "bob")
+
+
+@pytest.fixture
+def again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lanes:
+    """Lanes without a renderer in which replay renders."""
+    lanes = Lanes(tmp_path / "scratch")
+    monkeypatch.setattr("generator.execution.replay.open_executor", lanes.open)
+    monkeypatch.setattr("generator.execution.replay.scratch_folder", lanes.folder)
+    return lanes
 
 
 @pytest.fixture(scope="session")

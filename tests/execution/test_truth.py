@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from dataclasses import replace
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
@@ -21,11 +23,14 @@ from generator.dataset.format.anchors_table import read_anchors
 from generator.dataset.format.heads_table import read_heads
 from generator.dataset.format.manifest import read_manifest, write_manifest
 from generator.dataset.format.open import as_array
+from generator.dataset.format.part import check_part, read_part
+from generator.dataset.format.passes import read_channels, write_passes
 from generator.dataset.proof.verify import verify_dataset
 from generator.errors import HeadError, UsageError
 from generator.execution.build.run import build
+from generator.execution.deep import look_deep
 from generator.execution.executors.open import open_executor
-from generator.execution.replay import replay_sample
+from generator.execution.replay import replay_sample, replay_samples
 from generator.geometry.rigid import fit_rotations
 from generator.geometry.rotation import (
     angles_from_rotation,
@@ -133,15 +138,11 @@ def test_wrong_passes_and_visibility_are_found(truth: Path, tmp_path: Path, what
         shutil.copy(sorted((root / "exr").rglob("*.exr"))[1], first)
         expected = f"{relative}: the passes are not those that were rendered (SHA-256 differs)"
     else:
-        from generator.dataset.format.part import check_part, read_part
-
         manifest = read_manifest(root)
         path = root / manifest.parts[0].path
         table = read_part(path)
         place = table.schema.get_field_index("landmarks_visible")
         flipped = ~as_array(table, "landmarks_visible").astype(bool)
-        import pyarrow as pa
-
         column = pa.array(flipped.tolist(), type=table.schema.field(place).type)
         pq.write_table(table.set_column(place, table.schema.field(place), column), path)
         part = check_part(path)
@@ -238,22 +239,55 @@ def test_replay_gives_the_same_bytes(truth: Path, tmp_path: Path) -> None:
 
 
 def test_replay_says_what_differs(truth: Path, tmp_path: Path) -> None:
-    from generator.dataset.format.part import check_part, read_part
-
     root = Path(shutil.copytree(truth, tmp_path / "d"))
     manifest = read_manifest(root)
     path = root / manifest.parts[0].path
     table = read_part(path)
     name = table["sample_id"][0].as_py()
     place = table.schema.get_field_index("image_sha256")
-    import pyarrow as pa
-
     changed = pa.array(["0" * 64, *table["image_sha256"].to_pylist()[1:]])
     pq.write_table(table.set_column(place, table.schema.field(place), changed), path)
     write_manifest(replace(manifest, parts=(check_part(path), *manifest.parts[1:])), root)
     found = replay_sample(root, name)
     assert not found.same
-    assert found.differences == ("the image differs: up to 0 of 255 levels, on 0.00% of its pixels",)
+    assert found.differences == (
+        f"the embedded image of {name} is what is rendered now; the hash in its row is not its own and "
+        "was changed",
+    )
+
+
+def test_replay_compares_the_passes_and_not_only_their_hash(truth: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(truth, tmp_path / "d"))
+    first, second = (str(rows_of(root)["sample_id"][row]) for row in (0, 1))
+    file = root / "exr" / f"{first}.exr"
+    write_passes({name: values + 1 for name, values in read_channels(file).items()}, file)
+    changed, same = replay_samples(root, [first, second])
+    says = "was changed after the build; what is rendered now has the recorded hash"
+    assert changed.differences == (f"exr/{first}.exr {says}",)
+    assert same.same and f"exr/{second}.exr, its recorded hash and the new passes" in same.text()
+
+
+def test_a_grey_picture_with_its_hash_fixed_everywhere(truth: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(truth, tmp_path / "d"))
+    manifest = read_manifest(root)
+    path = root / manifest.parts[0].path
+    table = read_part(path)
+    images, hashes = (table[column].to_pylist() for column in ("image", "image_sha256"))
+    grey = cv2.imencode(".png", np.full((96, 96, 3), 128, np.uint8))[1].tobytes()
+    images[0]["bytes"], hashes[0] = grey, hashlib.sha256(grey).hexdigest()
+    for column, values in (("image", images), ("image_sha256", hashes)):
+        place = table.schema.get_field_index(column)
+        field = table.schema.field(place)
+        table = table.set_column(place, field, pa.array(values, field.type))
+    pq.write_table(table, path)
+    write_manifest(replace(manifest, parts=(check_part(path), *manifest.parts[1:])), root)
+    report = verify_dataset(root)
+    assert report.ok, report.text()
+    deep = look_deep(report, root, None)
+    [wrong] = [check for check in deep.checks if not check.ok]
+    assert deep.deep is not None and deep.deep.complete and deep.deep.decoded == 12
+    assert wrong.count == 1, wrong.detail
+    assert f"{table['sample_id'][0]}: the image differs: up to " in wrong.detail
 
 
 def test_replay_refuses_other_heads_in_one_line(one_head: Path, tmp_path: Path) -> None:

@@ -46,11 +46,11 @@ class Compare:
     """How replay compares what a row holds with what came out again.
 
     kind: "exact"; "floats" (NaN equals NaN; the largest difference is told in unit); "flags" (those
-        that differ are counted); "image" (the caller says how far the pictures are apart).
+        that differ are counted). Of a file's hash the file itself is compared too, where there is one.
     says: the line about a difference; {name}, {then} and {now} are filled in.
     """
 
-    kind: Literal["exact", "floats", "flags", "image"] = "exact"
+    kind: Literal["exact", "floats", "flags"] = "exact"
     unit: str = ""
     says: str = "{name} differs"
 
@@ -206,7 +206,7 @@ def _row_columns() -> tuple[Column, ...]:
         Column("image_path", text, "of the image file, relative to the dataset; else empty", image,
                lambda rows: rows.image_paths, default="", images="files", guard="path", local=True),
         Column("image_sha256", text, "of the image file's bytes, also where images are not stored", image,
-               lambda rows: rows.image_hashes, Compare("image", says="the image differs")),
+               lambda rows: rows.image_hashes, Compare(says="the image differs")),
         Column("passes_path", text, "OpenEXR of the passes, relative to the dataset; empty without passes",
                "passes", lambda rows: rows.passes_paths, since="1.1.0", default="", guard="path", local=True),
         Column("passes_sha256", text, "of the floats of the passes; empty without passes", "passes",

@@ -4,11 +4,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from generator.dataset.format.columns import ROWS, Compare
+
+
+@dataclass(frozen=True)
+class StoredFile:
+    """What a dataset holds of a row besides its values, as it is now.
+
+    name: for people, such as images/a/neutral/y+0_p+0_r+0.png. sha256: what its column should say.
+    detail: how far it is from the new one, such as ": up to 3 of 255 levels"; asked for only where
+        they differ.
+    """
+
+    name: str
+    sha256: str
+    detail: Callable[[], str] = lambda: ""
 
 
 def compared_columns() -> dict[str, Compare]:
@@ -17,18 +32,41 @@ def compared_columns() -> dict[str, Compare]:
 
 
 def row_differences(
-    recorded: Mapping[str, Any], now: Mapping[str, Any], image_detail: Callable[[], str] = lambda: ""
+    recorded: Mapping[str, Any], now: Mapping[str, Any], stored: Mapping[str, StoredFile] | None = None
 ) -> list[str]:
     """What differs between two rows as plain values, a line each.
 
-    image_detail: how far the pictures are apart, such as ": up to 3 of 255 levels"; asked for only
-        where their hashes differ.
+    stored: the files whose hash a column holds, by its name; of those that are not there the recorded
+        hash alone is compared.
     """
     lines = []
     for name, how in compared_columns().items():
-        if line := _difference(name, how, recorded[name], now[name]):
-            lines.append(line + (image_detail() if how.kind == "image" else ""))
+        if stored and name in stored:
+            line = _file_difference(how, stored[name], recorded[name], now[name])
+        else:
+            line = _difference(name, how, recorded[name], now[name])
+        if line:
+            lines.append(line)
     return lines
+
+
+def _file_difference(how: Compare, file: StoredFile, then: str, now: str) -> str:
+    """Which of three differs: the file, the hash in its row, or what is rendered now; "" if none."""
+    if file.sha256 == then == now:
+        return ""
+    if file.sha256 == then:
+        return how.says + file.detail()
+    if then == now:
+        return (
+            f"{file.name} was changed after the build{file.detail()}; "
+            "what is rendered now has the recorded hash"
+        )
+    if file.sha256 == now:
+        return f"{file.name} is what is rendered now; the hash in its row is not its own and was changed"
+    return (
+        f"{file.name} has not the hash in its row, and what is rendered now has neither's{file.detail()}: "
+        "file, row or both were changed"
+    )
 
 
 def _difference(name: str, how: Compare, then: Any, now: Any) -> str:

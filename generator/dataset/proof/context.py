@@ -17,7 +17,7 @@ from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.schema import is_newer
 from generator.errors import DatasetError, UsageError
 from generator.geometry.camera import Camera
-from generator.plan.config import recorded_config
+from generator.plan.config import BuildConfig, recorded_config
 from generator.plan.settings import known_values
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Views
@@ -29,6 +29,22 @@ ExpectedCamera = Callable[[int, int], Camera]
 """(place in heads.parquet, place in the head's plan) -> the camera that row has to have."""
 
 
+def known_config(manifest: Manifest, root: Path) -> BuildConfig:
+    """The recorded configuration, as far as we know its settings.
+
+    Raises DatasetError if it is none.
+    """
+    configuration = manifest.configuration
+    if is_newer(manifest.schema_version):  # it may have settings that we do not know
+        configuration = known_values(configuration)
+    try:
+        return recorded_config(configuration, root)
+    except UsageError as error:
+        raise DatasetError(
+            f"manifest.json: its configuration cannot be read ({error}); run `headturn build` again"
+        ) from error
+
+
 def planned_cameras(
     heads: Sequence[HeadRow], poses: DatasetPoses, manifest: Manifest, root: Path
 ) -> ExpectedCamera:
@@ -37,15 +53,7 @@ def planned_cameras(
     Neither heads.parquet nor the rows are asked: their cameras are what is to be proved.
     Raises DatasetError if the configuration is none.
     """
-    configuration = manifest.configuration
-    if is_newer(manifest.schema_version):  # it may have settings that we do not know
-        configuration = known_values(configuration)
-    try:
-        config = recorded_config(configuration, root)
-    except UsageError as error:
-        raise DatasetError(
-            f"manifest.json: its configuration cannot be read ({error}); run `headturn build` again"
-        ) from error
+    config = known_config(manifest, root)
 
     @lru_cache(maxsize=HEADS_AT_HAND)
     def views(head: int) -> Views:

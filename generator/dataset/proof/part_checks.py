@@ -15,7 +15,7 @@ from generator.dataset.format.anchors_table import HeadAnchors
 from generator.dataset.format.columns import ROWS
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.defaults import todays_schema, with_defaults
-from generator.dataset.format.digest import add_digests, content_digest
+from generator.dataset.format.digest import digest_of, row_hashes
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HeadRow
@@ -35,12 +35,14 @@ class PartFindings:
     """What one part showed.
 
     checks: by name; those without problems may be absent. digest: None where it could not be read.
+    hashes: of its rows, see :func:`generator.dataset.format.digest.row_hashes`.
     heads, poses: int32 [N], the place of each known row in heads.parquet and poses.csv;
     detected: bool [N]. measured: see :class:`generator.dataset.proof.context.RowContext`.
     """
 
     rows: int = 0
     digest: str | None = None
+    hashes: bytes = b""
     measured: dict[str, float] = field(default_factory=dict)
     checks: dict[str, Check] = field(default_factory=dict)
     heads: list[np.ndarray] = field(default_factory=list)
@@ -124,8 +126,8 @@ class PartChecker:
             found.add("schema", (f"{part.path}: {problem}" for problem in wrong))
             if wrong:
                 return found
-            rows, detected, digests = 0, 0, []
             heads: set[tuple[str, str]] = set()
+            rows, detected, hashes = 0, 0, bytearray()
             today = todays_schema(stored, str(path))
             for batch in iter_stored(path):
                 if nulls := [name for name in batch.schema.names if _nulls(batch.column(name))]:
@@ -136,12 +138,12 @@ class PartChecker:
                 names = (batch.column(name).to_pylist() for name in ("subject", "expression"))
                 heads.update(zip(*names, strict=True))
                 with reading(path):
-                    digests.append(content_digest(batch))
+                    hashes += row_hashes(batch)
                 self._check_rows(with_defaults(batch, today), part, found)
         except (OSError, HeadturnError, UnicodeDecodeError) as error:
             found.add("part hashes", [f"{part.path} cannot be read: {error}"])
             return found
-        found.rows, found.digest = rows, add_digests(digests)
+        found.rows, found.hashes, found.digest = rows, bytes(hashes), digest_of(hashes)
         if (rows, detected) != (part.rows, part.detected):
             found.add("part hashes", [f"{part.path} has {rows} rows, the manifest says {part.rows}"])
         said = (part.subject, part.expression)

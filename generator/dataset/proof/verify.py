@@ -23,6 +23,7 @@ from generator.dataset.format.files import file_sha256
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import read_heads
 from generator.dataset.format.manifest import Manifest, covered_files, read_manifest, side_tables
+from generator.dataset.format.merkle import merkle_root
 from generator.dataset.format.open import dataset_topology
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer
@@ -48,6 +49,9 @@ def check_names(quick: bool = False, schema_version: str = SCHEMA_VERSION) -> li
     return names
 
 
+EXPECTED = "expected digest"
+"""The check for which the user names a digest."""
+
 ROWS_A_WORKER = 5000
 """With fewer rows than this for each, starting another process takes longer than it saves."""
 
@@ -59,30 +63,37 @@ def verify_dataset(
     path: Path,
     *,
     quick: bool = False,
+    expected: str | None = None,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> VerifyReport:
     """Check a dataset part by part, in memory that does not grow with its rows' content.
 
+    It grows by the hash of each row, see :func:`generator.dataset.format.merkle.merkle_root`.
+
     quick: only what needs no reading of rows: the tables, the parts' sizes, footers and schemas,
         and that their rows add up to heads x poses.
+    expected: the digest or the Merkle root that the rows must have, 64 hex digits; not with quick.
     workers: processes; default one a core, where there is enough to do.
     progress: called with (parts done, parts in all).
     Never raises for what is wrong with the dataset: every problem is a line of the report.
 
     Raises
     ------
-    DatasetError: a process that was checking parts was killed.
+    DatasetError: a process that was checking parts was killed. ValueError: expected with quick.
     """
+    if quick and expected is not None:
+        raise ValueError("only reading the rows shows what their digest is")
     root = Path(path)
-    checks = {name: Check(name) for name in check_names(quick)}
+    asked = [] if expected is None else [EXPECTED]
+    checks = {name: Check(name) for name in [*check_names(quick), *asked]}
     try:
         manifest = read_manifest(root)
     except DatasetError as error:
         checks["manifest"].add([str(error)])
         return VerifyReport(tuple(checks.values()), quick=quick)
     # An older dataset has fewer columns, and fewer things to be wrong about.
-    checks = {name: Check(name) for name in check_names(quick, manifest.schema_version)}
+    checks = {name: Check(name) for name in [*check_names(quick, manifest.schema_version), *asked]}
     report = VerifyReport(tuple(checks.values()), quick=quick)
     checks["manifest"].done = True
     try:
@@ -108,7 +119,7 @@ def verify_dataset(
         check.done = True
     parts = _present_parts(root, manifest, checks["part files"])
     tally = DetectionTally(heads, poses)
-    rows, closure_deg, digests = 0, 0.0, []
+    rows, closure_deg, digests, hashes = 0, 0.0, list[str](), list[bytes]()
     with _findings(root, checker, manifest, parts, quick, workers) as findings:
         for done, found in enumerate(findings, start=1):
             for name, problems in found.checks.items():
@@ -116,6 +127,7 @@ def verify_dataset(
             if found.digest is not None:
                 rows += found.rows
                 digests.append(found.digest)
+                hashes.append(found.hashes)
             closure_deg = max(closure_deg, found.measured.get("closure_deg", 0.0))
             for places in zip(found.heads, found.poses, found.detected, strict=True):
                 tally.add(*places)
@@ -133,14 +145,21 @@ def verify_dataset(
             )
         return replace(
             whole,
+            digest=manifest.digest,
             detected_rows=manifest.detected_rows,
             detection_rate=manifest.detected_rows / manifest.rows if manifest.rows else float("nan"),
         )
     _check_every_row_once(tally, manifest, checks["every row once"])
-    if add_digests(digests) != manifest.digest:
+    digest, merkle = add_digests(digests), merkle_root(hashes)
+    if digest != manifest.digest:
         checks["digest"].add(["the digest of all rows is not the manifest's"])
+    if expected is not None and expected not in (digest, merkle):
+        checks[EXPECTED].add([f"neither digest nor Merkle root of the rows is {expected}"])
     return replace(
         whole,
+        digest=digest,
+        merkle_root=merkle,
+        expected=expected,
         detected_rows=int(tally.detected.sum(dtype=np.int64)),
         detection_rate=tally.rate,
         closure_deg=closure_deg,

@@ -14,6 +14,18 @@ SHOWN = 3
 
 WORST = 5
 
+PROVED = (
+    "proved: every row of the plan is there once and agrees with heads, poses and configuration; "
+    "every file has its recorded hash"
+)
+NO_IMAGES = "not proved: that images show what was recorded (--deep renders them again)"
+OTHER_IMAGES = "not proved: that the other images show what was recorded (--deep all)"
+NO_ORIGIN = (
+    "not proved: that nobody recorded it all anew, hashes included "
+    "(--digest with the Merkle root that its maker tells you)"
+)
+CHECKSUM = "the digest you expected is a checksum: it finds damage; against deceit, expect the Merkle root"
+
 NOT_CHECKED = "not checked, because of the problems above"
 
 
@@ -53,11 +65,48 @@ class Check:
 
 
 @dataclass(frozen=True)
+class Deep:
+    """What was done to show that images are those of their rows.
+
+    chosen: rows; all_rows: were they all? seed: that chose them. images: as the manifest has them.
+    decoded: images that are one, of the right kind and size. rendered: rows that were rendered again
+    and compared. not_rendered: reason -> rows. versions: what rendered then and now, where it differs.
+    """
+
+    chosen: int
+    all_rows: bool
+    seed: int
+    images: str
+    decoded: int
+    rendered: int
+    not_rendered: dict[str, int]
+    versions: tuple[str, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Was every chosen row rendered again?"""
+        return self.rendered == self.chosen
+
+    def lines(self) -> list[str]:
+        """For people."""
+        which = "all rows" if self.all_rows else f"{self.chosen} rows, chosen with seed {self.seed}"
+        seen = "no images are stored" if self.images == "none" else f"{self.decoded} images decoded"
+        said = [f"{which}: {seen}, {self.rendered} rendered again and compared"]
+        said += [f"  {count} not rendered again: {why}" for why, count in self.not_rendered.items()]
+        if self.versions:
+            said.append(f"  other versions may render other images: {'; '.join(self.versions)}")
+        return said
+
+
+@dataclass(frozen=True)
 class VerifyReport:
     """What was checked and what was counted. Rates are shares of 1; NaN without rows.
 
     closure_deg: the largest angle between R_C and the rigid fit of landmarks_exact.
-    quick: contents were not read; then closure_deg, rate_by_subject and cells are empty.
+    quick: contents were not read; then closure_deg, rate_by_subject, cells and merkle_root are empty.
+    digest, merkle_root: of the rows that were read; the manifest's digest if quick; "" if there is none.
+    expected: the digest or root that they must have, if the user named one.
+    deep: what was done about images, if it was asked for and everything else holds.
     """
 
     checks: tuple[Check, ...]
@@ -70,6 +119,10 @@ class VerifyReport:
     rate_by_subject: dict[str, float] = field(default_factory=dict)
     cells: tuple[Cell, ...] = ()
     quick: bool = False
+    digest: str = ""
+    merkle_root: str = ""
+    expected: str | None = None
+    deep: Deep | None = None
 
     @property
     def ok(self) -> bool:
@@ -106,14 +159,39 @@ class VerifyReport:
                 for cell in self.worst_cells
                 if cell.rate < 1
             ]
+        if self.deep is not None:
+            lines += self.deep.lines()
+        if not self.quick and self.ok:
+            lines += [PROVED, *self._not_proved]
+        if self.digest:
+            lines.append(f"digest {self.digest}, " + self._root_text)
         return "\n".join(lines)
+
+    @property
+    def _not_proved(self) -> list[str]:
+        """What even a report without problems leaves open."""
+        lines = []
+        if self.deep is None or not self.deep.rendered:
+            lines.append(NO_IMAGES)
+        elif not (self.deep.all_rows and self.deep.complete):
+            lines.append(OTHER_IMAGES)
+        if self.expected != self.merkle_root:
+            lines.append(NO_ORIGIN)
+        return lines + [CHECKSUM] * (self.expected == self.digest)
+
+    @property
+    def _root_text(self) -> str:
+        return "as the manifest says" if self.quick else f"Merkle root {self.merkle_root}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {
             "ok": self.ok,
             "quick": self.quick,
+            "digest": self.digest,
+            "merkle_root": self.merkle_root,
             "checks": [{"name": c.name, "ok": c.ok, "detail": c.detail} for c in self.checks],
+            "deep": asdict(self.deep) if self.deep else None,
             "heads": self.heads,
             "poses": self.poses,
             "rows": self.rows,
