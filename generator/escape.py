@@ -9,6 +9,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def shortened(text: str, most: int = 80) -> str:
+    """A stranger's text on one line of at most so many characters."""
+    return printable(text if len(text) <= most else text[: most - 3] + "...")
+
+
 def quoted(text: str) -> str:
     """A stranger's name in quotes, for a message."""
-    return f"'{printable(text if len(text) <= 80 else text[:77] + '...')}'"
+    return f"'{shortened(text)}'"

@@ -52,13 +52,17 @@ def available_cores() -> list[int]:
 
 
 @contextmanager
-def native_silence() -> Iterator[None]:
-    """What native code writes to stderr is lost; Python's own messages are not meant to come in between."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+def native_silence(*streams: int) -> Iterator[None]:
+    """What native code writes to stderr, or to these streams by their numbers, is lost; Python's own
+    messages are not meant to come in between."""
+    kept = {stream: os.dup(stream) for stream in streams or (2,)}
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in kept:
+        os.dup2(nowhere, stream)
     try:
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        for stream, copy in kept.items():
+            os.dup2(copy, stream)
+            os.close(copy)
         os.close(nowhere)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import stat
 import sys
 from pathlib import Path
@@ -24,6 +25,12 @@ MAX_STATE_BYTES = 1 << 30
 """Of a file of ours that grows with the dataset: a manifest of a million parts has a third of this."""
 
 MAX_CONFIG_BYTES = 1 << 22
+
+MAX_DOTS = 100
+"""Of a key in TOML."""
+
+_TOML_STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
+_TOML_MARK = re.compile(r"[.,=\n\[\]{}]")
 
 
 def check_regular(path: Path, limit: int) -> int:
@@ -66,6 +73,12 @@ def parse_json(text: str | bytes) -> Any:
 
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML that may come from anyone. Raises ValueError: it is none, or nested too deeply."""
+    # A key of n dots takes n^2 steps, and what it makes nobody could print.
+    dots = 0
+    for mark in _TOML_MARK.finditer(_TOML_STRING.sub("", text)):
+        dots = dots + 1 if mark[0] == "." else 0
+        if dots > MAX_DOTS:
+            raise ValueError("nested too deeply")
     try:
         return tomllib.loads(text)
     except RecursionError as error:

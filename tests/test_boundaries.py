@@ -56,7 +56,7 @@ def test_module(path: Path) -> None:
     assert "downstream_hpe" not in tops
     layer = parts[1] if len(parts) > 2 else None
     if layer != "blender":
-        assert not tops & {"bpy", "mathutils"}, "only generator/blender may import bpy"
+        assert not tops & {"bpy", "bpy_extras", "mathutils"}, "only generator/blender may import bpy"
     if layer is not None:
         used = {n.split(".")[1] for n in imports(path) if n.startswith("generator.") and "." in n}
         assert used & set(MAY_IMPORT) <= MAY_IMPORT[layer] | {layer}
@@ -64,7 +64,7 @@ def test_module(path: Path) -> None:
 
 def test_the_render_worker_needs_numpy_and_the_standard_library_alone() -> None:
     """Whatever the worker imports, directly or not, runs inside any Blender."""
-    allowed = {"numpy", "bpy", "mathutils", "generator", *sys.stdlib_module_names}
+    allowed = {"numpy", "bpy", "bpy_extras", "mathutils", "generator", *sys.stdlib_module_names}
     seen, todo = set(), ["generator.blender.worker"]
     while todo:
         name = todo.pop()

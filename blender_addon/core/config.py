@@ -18,6 +18,7 @@ from typing import Any
 
 from generator.errors import UsageError
 from generator.plan.settings import SECTIONS, Values
+from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 
 
 def read_config(path: Path) -> Values:
@@ -25,13 +26,11 @@ def read_config(path: Path) -> Values:
 
     Raises UsageError: it cannot be read, is not TOML, or holds something else.
     """
-    import tomllib  # Blender 4.2 is the first with a Python that has it, and start-up is not slower for it
-
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = parse_toml(read_text(path, MAX_CONFIG_BYTES))
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such configuration file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (ValueError, OSError) as error:
         raise UsageError(f"{path}: not a TOML configuration: {error}") from error
     for name, table in values.items():
         if name not in SECTIONS or not isinstance(table, dict):

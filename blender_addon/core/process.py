@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import IO, Any
 
 from generator.errors import WorkerError
+from generator.reading import parse_json
 
 _LOG_LINES = 40
 
@@ -77,7 +78,7 @@ class HostProcess:
             while True:
                 line = self._lines.get_nowait()
                 try:
-                    objects.append(json.loads(line))
+                    objects.append(parse_json(line))
                 except ValueError:
                     self._log.append(line)
         return objects

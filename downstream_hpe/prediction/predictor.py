@@ -15,6 +15,7 @@ from downstream_hpe.geometry.face_mesh import POINTS
 from downstream_hpe.prediction import onnx_file
 from downstream_hpe.prediction.detector import FaceDetector
 from downstream_hpe.prediction.onnx_file import FORMAT, SHAPES
+from downstream_hpe.prediction.onnx_shapes import BATCH
 
 MODEL_FILE = "model.onnx"
 DEFAULT_MODEL = "headturn"
@@ -120,13 +121,8 @@ class Predictor:
         if not len(points):
             none = {name: np.empty((0, *SHAPES[name]), dtype=np.float32) for name in self._outputs}
             return _pose(none)
-        try:
-            values = self._session.run(self._outputs, {"landmarks": points})
-        except _faults() as error:
-            raise ModelError(
-                f"{self._name}: fails on landmarks ({type(error).__name__}); {EXPORT_AGAIN}"
-            ) from error
-        found = dict(zip(self._outputs, values, strict=True))
+        batches = [self._run(points[start : start + BATCH]) for start in range(0, len(points), BATCH)]
+        found = {name: np.concatenate([batch[name] for batch in batches]) for name in self._outputs}
         if not all(np.isfinite(value).all() for value in found.values()):
             if (np.ptp(points, axis=1) == 0).all(axis=1).any():
                 raise DataError(
@@ -134,6 +130,17 @@ class Predictor:
                 )
             raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
         return _pose(found)
+
+    def _run(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        try:
+            values = self._session.run(self._outputs, {"landmarks": points})
+        except _faults() as error:
+            raise ModelError(
+                f"{self._name}: fails on landmarks ({type(error).__name__}); {EXPORT_AGAIN}"
+            ) from error
+        if any(len(value) != len(points) for value in values):
+            raise ModelError(f"{self._name}: gives another number of poses than of faces; {EXPORT_AGAIN}")
+        return dict(zip(self._outputs, values, strict=True))
 
     def from_image(self, bgr: np.ndarray, faces: int = 1) -> Pose | None:
         """Pose of the most prominent faces of a picture, at most so many; None where no face is found.

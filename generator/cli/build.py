@@ -17,6 +17,7 @@ from generator.cli.options import with_settings
 from generator.cli.reporter import JsonReporter, TerminalReporter
 from generator.errors import HeadturnError
 from generator.execution.lanes.options import DEADLINE_S
+from generator.limits import MAX_WORKERS
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.settings import Values, all_settings
 
@@ -26,7 +27,9 @@ def build(
         Path | None, typer.Argument(metavar="[CONFIG.toml]", help="Configuration; flags override it.")
     ] = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the dataset.")] = Path("dataset"),
-    workers: Annotated[int | None, typer.Option(min=1, help="Lanes; default one a core.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=MAX_WORKERS, help="Lanes; default one a core.")
+    ] = None,
     executor: Annotated[
         str,
         typer.Option(
@@ -37,10 +40,11 @@ def build(
         str | None, typer.Option(help="Ray cluster, such as auto; without it Ray runs here alone.")
     ] = None,
     deadline: Annotated[
-        float, typer.Option(min=1, help="Seconds of silence after which a worker is replaced.")
+        float, typer.Option(min=1, max=10**9, help="Seconds of silence after which a worker is replaced.")
     ] = DEADLINE_S,
     memory: Annotated[
-        float | None, typer.Option(min=0, help="MiB a lane may grow to; default 80 % of the machine for all.")
+        float | None,
+        typer.Option(min=0, max=10**9, help="MiB a lane may grow to; default 80 % of the machine for all."),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Delete the dataset that is there first.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,
@@ -112,7 +116,7 @@ def run(
 def compact(
     folder: Annotated[Path, typer.Argument(help="A finished dataset.")],
     target: Annotated[Path, typer.Option("--out", help="Folder of the new dataset.")],
-    megabytes: Annotated[int, typer.Option(min=1, help="Size of a part, about.")] = 256,
+    megabytes: Annotated[int, typer.Option(min=1, max=10**6, help="Size of a part, about.")] = 256,
     as_json: JsonFlag = False,
 ) -> None:
     """Merge the parts of a dataset into a few large ones, as a new dataset with the same rows."""

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import typer
 
 from generator.errors import UsageError
+from generator.escape import shortened
 from generator.plan.setting import Setting
 from generator.plan.settings import Values
 
@@ -77,8 +78,8 @@ def pose_source(text: str) -> dict[str, Any]:
     if kind == "grid" and not count:
         return {"kind": "grid"}
     if kind in ("uniform", "sobol"):
-        if not count.isdecimal():
-            raise UsageError(f"--poses {text!r}: say how many, such as {kind}:500")
+        if not count.isdecimal() or len(count) > 20:
+            raise UsageError(f"--poses {shortened(repr(text))}: say how many, such as {kind}:500")
         return {"kind": kind, "count": int(count)}
     return {"kind": "csv", "path": text}
 

@@ -13,6 +13,7 @@ import typer
 from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err
 from generator.cli.reporter import TerminalReporter
 from generator.errors import UsageError
+from generator.limits import MAX_WORKERS
 
 
 def verify(
@@ -39,7 +40,7 @@ def verify(
     ] = None,
     blender: BlenderOption = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; default one a core where it pays.")
+        int | None, typer.Option(min=1, max=MAX_WORKERS, help="Processes; default one a core where it pays.")
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:

@@ -6,10 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.limits import MAX_EXPRESSIONS
+from generator.reading import read_limited
 
 CARD_NAME = "head.json"
 MAX_CARD_BYTES = 1 << 22
@@ -38,7 +40,7 @@ class HeadCard(BaseModel):
     units: Literal["um", "mm", "cm", "dm", "m"] | None = None
     up: Axis | None = None
     forward: Axis | None = None
-    expressions: dict[str, str | CardExpression]
+    expressions: dict[str, str | CardExpression] = Field(max_length=MAX_EXPRESSIONS)
 
     def files(self) -> dict[str, str]:
         """File name of each expression."""
@@ -50,15 +52,17 @@ def read_card(path: Path) -> HeadCard:
 
     Raises
     ------
-    HeadError: not JSON, or a field is missing or of the wrong kind.
+    HeadError: no regular file, too large, not JSON, or a field is missing or of the wrong kind.
     """
     try:
-        if path.stat().st_size > MAX_CARD_BYTES:
-            raise HeadError(f"{path} is larger than {MAX_CARD_BYTES >> 20} MB, which no head.json is")
-        return HeadCard.model_validate_json(path.read_bytes())
+        data = read_limited(path, MAX_CARD_BYTES)
+    except ValueError as error:
+        raise HeadError(f"{path} {error}") from error
+    except OSError as error:
+        raise HeadError(f"{path} cannot be read: {error.strerror}") from error
+    try:
+        return HeadCard.model_validate_json(data)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "the file"
         raise HeadError(f"{path}: {quoted(where)}: {' '.join(first['msg'].split())}; correct it") from error
-    except OSError as error:
-        raise HeadError(f"{path} cannot be read: {error.strerror}") from error

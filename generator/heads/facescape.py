@@ -138,6 +138,8 @@ def _head(number: int, folder: Path, name: str, names: set[str]) -> Head | Skipp
         )
     if name not in names:
         return SkippedHead(subject, expression, mesh_path, f"the mesh {name} is missing")
+    if not mesh_path.is_file():
+        return SkippedHead(subject, expression, mesh_path, f"the mesh {name} is not a file")
     images = [mesh_path.stem + suffix for suffix in _IMAGE_SUFFIXES]
     texture = next((folder / image for image in images if image in names), None)
     if texture is None:

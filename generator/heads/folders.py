@@ -10,7 +10,8 @@ from pathlib import Path
 from generator.errors import HeadError
 from generator.escape import printable
 from generator.heads.card import CARD_NAME, HeadCard, read_card
-from generator.heads.gltf import gltf_files
+from generator.heads.fbx import check_fbx
+from generator.heads.gltf_file import gltf_files
 from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
 from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key
@@ -168,6 +169,9 @@ def _textures(mesh: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
             return ((texture,) if texture else ()), ()
         case ".gltf":
             return gltf_files(mesh), ()
+        case ".fbx":
+            # Blender reads its textures; what they are stands in no unit's name.
+            return (), check_fbx(mesh)
     return (), ()
 
 

@@ -8,8 +8,6 @@ each material is replaced by its number, and trimesh only gets geometry.
 
 from __future__ import annotations
 
-import base64
-import binascii
 import io
 import json
 import struct
@@ -25,14 +23,19 @@ from trimesh.visual import TextureVisuals
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.gltf_file import BIN, FLOAT, JSON, MAGIC, check_header, split_gltf, uri_bytes
+from generator.heads.limits import (
+    MAX_GEOMETRY_BYTES,
+    MAX_TRIANGLES,
+    MAX_VERTICES,
+    check_count,
+    read_mesh_bytes,
+)
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SEE_THROUGH, SKIN
 from generator.heads.paths import find_inside
-from generator.heads.textures import check_image, has_holes, open_image
+from generator.heads.textures import Textures, open_image
 
-MAX_VERTICES = 20_000_000
-_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-_FLOAT = 5126
 # Anything in the JSON may be missing or of another kind than the standard says.
 _MALFORMED = (LookupError, TypeError, AttributeError, ValueError, AssertionError, RecursionError)
 _UNTRANSFORMED = {"offset": [0, 0], "scale": [1, 1], "rotation": 0}
@@ -45,7 +48,7 @@ class _Folder(Resolver):
         self.folder = folder
 
     def get(self, key: str) -> bytes:
-        return find_inside(self.folder, unquote(key), "buffer").read_bytes()
+        return read_mesh_bytes(find_inside(self.folder, unquote(key), "buffer"), MAX_GEOMETRY_BYTES)
 
     def keys(self) -> list[str]:
         return []
@@ -81,9 +84,10 @@ def read_gltf(path: Path, scratch: Path) -> HeadMesh:
     """
     try:
         header, binary = split_gltf(path)
-        _check(header)
-        materials = _materials(header, binary, path, scratch)
-        return _assemble(_load_geometry(header, binary, _Folder(path.parent)), materials)
+        check_header(header)
+        textures = Textures()
+        materials = _materials(header, binary, path, scratch, textures)
+        return _assemble(_load_geometry(header, binary, _Folder(path.parent)), materials, textures)
     except _MALFORMED as error:
         what = f"{type(error).__name__}: {error}"
         raise HeadError(
@@ -91,60 +95,11 @@ def read_gltf(path: Path, scratch: Path) -> HeadMesh:
         ) from error
 
 
-def split_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
-    """The JSON and the binary chunk (empty for .gltf) of a file.
-
-    Raises
-    ------
-    HeadError: neither kind of glTF, or version 1.
-    """
-    data = path.read_bytes()
-    binary = b""
-    try:
-        if data[:4] == b"glTF":
-            _, version, _, length, kind = struct.unpack_from("<5I", data)
-            text, rest = data[20 : 20 + length], data[20 + length :]
-            if kind != _JSON or len(text) != length or version != 2:
-                raise ValueError("broken container")
-            if rest:
-                length, kind = struct.unpack_from("<2I", rest)
-                binary = rest[8 : 8 + length]
-                if len(binary) != length:
-                    raise ValueError("truncated")
-        else:
-            text = data
-        header = json.loads(text)
-        if not isinstance(header, dict) or not str(header["asset"]["version"]).startswith("2"):
-            raise ValueError("not version 2")
-    except (ValueError, KeyError, TypeError, struct.error, RecursionError) as error:
-        raise HeadError(f"not a glTF 2.0 file ({error}); export it again") from error
-    return header, binary
-
-
-def _check(header: dict[str, Any]) -> None:
-    unknown = [e for e in header.get("extensionsRequired", []) if not str(e).startswith("KHR_materials_")]
-    if unknown:
-        raise HeadError(f"the file needs {quoted(', '.join(map(str, unknown)))}; export it without")
-    for accessor in header.get("accessors", []):
-        if not 0 <= accessor["count"] <= MAX_VERTICES:
-            raise HeadError(f"the file claims {accessor['count']} elements; {MAX_VERTICES} is the limit")
-    parents: dict[int, int] = {}
-    for index, node in enumerate(header.get("nodes", [])):
-        for child in node.get("children", []):
-            if child in parents:
-                raise HeadError("the node tree of the file is not a tree; export it again")
-            parents[child] = index
-    for start in parents:
-        node, steps = start, 0
-        while node in parents:
-            node, steps = parents[node], steps + 1
-            if steps > len(parents):
-                raise HeadError("the node tree of the file is not a tree; export it again")
-
-
-def _materials(header: dict[str, Any], binary: bytes, path: Path, scratch: Path) -> list[_Source]:
+def _materials(
+    header: dict[str, Any], binary: bytes, path: Path, scratch: Path, textures: Textures
+) -> list[_Source]:
     """The materials of the file, then the one of primitives that name none."""
-    images: dict[int, Path] = {}
+    images: dict[int | str, Path] = {}
     result = []
     for index, material in enumerate(header.get("materials", [])):
         pbr = material.get("pbrMetallicRoughness", {})
@@ -157,9 +112,13 @@ def _materials(header: dict[str, Any], binary: bytes, path: Path, scratch: Path)
             if moved or reference.get("texCoord", 0) != 0:
                 raise HeadError("a texture uses a second or transformed set of coordinates; bake them")
             number = header["textures"][reference["index"]]["source"]
-            if number not in images:
-                images[number] = _image(header, binary, number, path, scratch)
-            texture = images[number]
+            image = header["images"][number]
+            # Many images of a file may share their bytes.
+            content: int | str = image["bufferView"] if "bufferView" in image else image["uri"]
+            if content not in images:
+                images[content] = _image(header, binary, number, path, scratch)
+                textures.check(images[content])
+            texture = images[content]
         red, green, blue = (float(x) for x in _srgb(np.array(factor[:3])))
         result.append(
             _Source(
@@ -180,30 +139,17 @@ def _image(header: dict[str, Any], binary: bytes, number: int, path: Path, scrat
         view = header["bufferViews"][image["bufferView"]]
         start = view.get("byteOffset", 0)
         uri = header["buffers"][view["buffer"]].get("uri")
-        source = binary if uri is None else _uri_bytes(uri, path.parent)
+        source = binary if uri is None else uri_bytes(uri, path.parent)
         data = source[start : start + view["byteLength"]]
     elif image["uri"].startswith("data:"):
-        data = _uri_bytes(image["uri"], path.parent)
+        data = uri_bytes(image["uri"], path.parent)
     else:
-        texture = find_inside(path.parent, unquote(image["uri"]), "texture")
-        check_image(texture)
-        return texture
+        return find_inside(path.parent, unquote(image["uri"]), "texture")
     texture = scratch / f"{path.stem}-image{number}"
     texture.write_bytes(data)
     with open_image(texture) as opened:
         suffix = ".jpg" if opened.format in ("JPEG", "MPO") else f".{str(opened.format).lower()}"
-    texture = texture.rename(texture.with_name(texture.name + suffix))
-    check_image(texture)
-    return texture
-
-
-def _uri_bytes(uri: str, folder: Path) -> bytes:
-    if not uri.startswith("data:"):
-        return find_inside(folder, unquote(uri), "buffer").read_bytes()
-    try:
-        return base64.b64decode(uri.partition("base64,")[2], validate=True)
-    except binascii.Error as error:
-        raise HeadError("an embedded file is not base64; export it again") from error
+    return texture.rename(texture.with_name(texture.name + suffix))
 
 
 def _load_geometry(header: dict[str, Any], binary: bytes, folder: _Folder) -> trimesh.Scene:
@@ -217,11 +163,11 @@ def _load_geometry(header: dict[str, Any], binary: bytes, folder: _Folder) -> tr
     ]
     text = json.dumps(bare).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<2I", len(text), _JSON) + text
+    chunks = struct.pack("<2I", len(text), JSON) + text
     if binary:
         binary += b"\0" * (-len(binary) % 4)
-        chunks += struct.pack("<2I", len(binary), _BIN) + binary
-    data = io.BytesIO(struct.pack("<3I", _MAGIC, 2, 12 + len(chunks)) + chunks)
+        chunks += struct.pack("<2I", len(binary), BIN) + binary
+    data = io.BytesIO(struct.pack("<3I", MAGIC, 2, 12 + len(chunks)) + chunks)
     scene = trimesh.load_scene(data, file_type="glb", resolver=folder, process=False)
     if not scene.graph.nodes_geometry:
         raise HeadError("the file has no meshes")
@@ -232,15 +178,15 @@ def _bare_primitive(primitive: dict[str, Any], none: int, header: dict[str, Any]
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
         raise HeadError("the mesh is Draco-compressed; export it without compression")
     uv = primitive["attributes"].get("TEXCOORD_0")
-    if uv is not None and header["accessors"][uv]["componentType"] != _FLOAT:
+    if uv is not None and header["accessors"][uv]["componentType"] != FLOAT:
         raise HeadError("the texture coordinates are stored as integers; export them as floats")
     return {**primitive, "material": primitive.get("material", none)}
 
 
-def _assemble(scene: trimesh.Scene, sources: list[_Source]) -> HeadMesh:
+def _assemble(scene: trimesh.Scene, sources: list[_Source], textures: Textures) -> HeadMesh:
     vertices, triangles, uvs, colors, index = [], [], [], [], []
     used: dict[int, int] = {}
-    problems, offset, colored = [], 0, False
+    problems, offset, count, colored = [], 0, 0, False
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
         mesh = scene.geometry[name]
@@ -255,8 +201,9 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source]) -> HeadMesh:
         if np.linalg.det(matrix[:3, :3]) < 0:
             faces = faces[:, ::-1]
         offset += len(mesh.vertices)
-        if offset > MAX_VERTICES:
-            raise HeadError(f"the scene has more than {MAX_VERTICES} vertices")
+        count += len(faces)
+        check_count(offset, MAX_VERTICES, "vertices")
+        check_count(count, MAX_TRIANGLES, "triangles")
         if len(faces) and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
             raise HeadError(f"a face uses a vertex beyond {len(mesh.vertices) - 1}; export the mesh again")
         vertices.append(np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3])
@@ -264,7 +211,7 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source]) -> HeadMesh:
         uv = mesh.visual.uv
         if uv is None and source.texture:
             raise HeadError(f"the textured material {quoted(source.name)} has no texture coordinates")
-        uvs.append(np.zeros((len(faces), 3, 2)) if uv is None else np.asarray(uv)[faces])
+        uvs.append(np.zeros((len(faces), 3, 2), np.float32) if uv is None else np.asarray(uv)[faces])
         color = mesh.visual.vertex_attributes.get("color")
         colored |= color is not None
         if color is None and source.color is None and source.texture is None:
@@ -274,7 +221,7 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source]) -> HeadMesh:
     if not vertices:
         raise HeadError("the file has no triangles that can be seen")
     all_uv, all_index = np.concatenate(uvs).astype(np.float32), np.concatenate(index)
-    materials = tuple(_material(sources[n], all_uv[all_index == i]) for n, i in used.items())
+    materials = tuple(_material(sources[n], all_uv[all_index == i], textures) for n, i in used.items())
     return HeadMesh(
         vertices=np.concatenate(vertices),
         triangles=np.concatenate(triangles).astype(np.int32),
@@ -286,9 +233,9 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source]) -> HeadMesh:
     )
 
 
-def _material(source: _Source, uv: np.ndarray) -> Material:
+def _material(source: _Source, uv: np.ndarray, textures: Textures) -> Material:
     texture = source.texture
-    cutout = texture is not None and has_holes(texture, uv) and source.mode != "OPAQUE"
+    cutout = texture is not None and textures.has_holes(texture, uv) and source.mode != "OPAQUE"
     return Material(source.name, source.color or SKIN, texture, cutout)
 
 
@@ -308,16 +255,3 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
         raise HeadError("a colour is not a finite number; export the mesh again")
     x = np.clip(linear, 0.0, 1.0)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
-def gltf_files(path: Path) -> tuple[Path, ...]:
-    """The buffers and images beside a .gltf.
-
-    Raises
-    ------
-    HeadError: not glTF, or one of them is missing or outside of the folder.
-    """
-    header, _ = split_gltf(path)
-    entries = [e for key in ("buffers", "images") for e in header.get(key, []) if isinstance(e, dict)]
-    uris = [entry["uri"] for entry in entries if isinstance(entry.get("uri"), str)]
-    return tuple(find_inside(path.parent, unquote(u), "file") for u in uris if not u.startswith("data:"))

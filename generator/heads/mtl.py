@@ -13,6 +13,7 @@ from pathlib import Path
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.limits import MAX_MATERIALS, check_count, check_mesh_file, read_mesh_bytes
 from generator.heads.paths import MissingFile, find_inside
 from generator.heads.textures import IMAGE_SUFFIXES
 
@@ -54,6 +55,7 @@ def find_library(mesh_path: Path) -> Path | None:
     ------
     HeadError: ``mtllib`` names a file outside of the mesh's folder.
     """
+    check_mesh_file(mesh_path)
     with mesh_path.open("rb") as file:
         header = decode(file.read(HEADER_BYTES))
     lines = [line.split(None, 1) for line in header.split("\n")]
@@ -81,19 +83,18 @@ def read_mtl(path: Path) -> dict[str, MtlMaterial]:
 
     Raises
     ------
-    HeadError: the file is too big, or a number in it is not one.
+    HeadError: the file is too big, holds too many materials, or a number in it is not one.
     """
-    if path.stat().st_size > MAX_MTL_BYTES:
-        raise HeadError(f"the material file {path} is larger than {MAX_MTL_BYTES >> 20} MB; make it smaller")
     materials: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
-    for number, line in enumerate(decode(path.read_bytes()).split("\n"), 1):
+    for number, line in enumerate(decode(read_mesh_bytes(path, MAX_MTL_BYTES)).split("\n"), 1):
         key, _, value = line.strip().replace("\t", " ").partition(" ")
         value = value.strip()
         try:
             match key.lower():
                 case "newmtl":
                     current = materials.setdefault(value, MtlMaterial())
+                    check_count(len(materials), MAX_MATERIALS, f"materials in {path.name}")
                 case "kd" if value[:1].isdigit() or value[:1] in ".-+":
                     current.color = _color(value)
                 case "d":

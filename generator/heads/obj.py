@@ -15,10 +15,11 @@ import numpy as np
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.limits import MAX_MATERIALS, check_count, read_mesh_bytes
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.mtl import MtlMaterial, decode, find_library, find_stem_texture, read_mtl
 from generator.heads.paths import MissingFile, find_inside
-from generator.heads.textures import check_image, combine_alpha, has_holes
+from generator.heads.textures import Textures, combine_alpha
 
 SKIN = (0.80, 0.62, 0.53)
 """sRGB of a head that comes without any colour."""
@@ -51,7 +52,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
     HeadError: the file cannot be parsed, an index points nowhere, or a
         texture is missing, outside of the folder or not an image.
     """
-    obj = _parse(decode(path.read_bytes()))
+    obj = _parse(decode(read_mesh_bytes(path)))
     vertices, colors = _vertex_arrays(obj)
     corners, material_index = _triangulate(obj)
     if not len(corners):
@@ -76,6 +77,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
     else:
         entries, problems = _library(path, names)
     uv = table[corner_uv]
+    textures = Textures()
     materials, keep = [], np.ones(len(position), dtype=bool)
     for index, name in enumerate(names):
         entry, of_material = entries[name], material_index == index
@@ -83,7 +85,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
             keep &= ~of_material
             problems.append(f"the see-through material {quoted(name)} is left out")
         uv[of_material] = uv[of_material] * entry.scale + entry.offset
-        materials.append(_material(path, scratch, name, index, entry, uv[of_material]))
+        materials.append(_material(path, scratch, textures, name, index, entry, uv[of_material]))
         if entry.color is None and not entry.texture and colors is None:
             problems.append(f"no texture or colour for the material {quoted(name)}; drawn as plain skin")
     if not keep.any():
@@ -135,6 +137,7 @@ def _parse(text: str) -> _Obj:
             elif key == "usemtl":
                 name = line.strip()[6:].strip()
                 material = obj.materials.setdefault(name, len(obj.materials))
+                check_count(len(obj.materials), MAX_MATERIALS, "materials")
     except ValueError as error:
         raise HeadError(
             f"line {number} cannot be read: {quoted(lines[number - 1])}; export the mesh again"
@@ -193,20 +196,26 @@ def _library(path: Path, names: list[str]) -> tuple[dict[str, MtlMaterial], list
 
 
 def _material(
-    path: Path, scratch: Path, name: str, index: int, entry: MtlMaterial, uv: np.ndarray
+    path: Path,
+    scratch: Path,
+    textures: Textures,
+    name: str,
+    index: int,
+    entry: MtlMaterial,
+    uv: np.ndarray,
 ) -> Material:
     color = entry.color or SKIN
     if not entry.texture:
         return Material(name or "skin", color)
     texture = find_inside(path.parent, entry.texture, "texture")
-    check_image(texture)
+    textures.check(texture)
     if entry.opacity_map and entry.opacity_map != entry.texture:
         opacity = find_inside(path.parent, entry.opacity_map, "opacity map")
         combined = scratch / f"{path.stem}-cutout{index}.png"
         combine_alpha(texture, opacity, combined)
-        if has_holes(combined, uv):
+        if textures.has_holes(combined, uv):
             return Material(name, color, combined, cutout=True)
-    return Material(name, color, texture, cutout=has_holes(texture, uv))
+    return Material(name, color, texture, cutout=textures.has_holes(texture, uv))
 
 
 def obj_files(path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:

@@ -7,6 +7,7 @@ material file says may reach outside of that folder.
 
 from __future__ import annotations
 
+import os
 import posixpath
 import re
 import unicodedata
@@ -72,6 +73,21 @@ def find_inside(folder: Path, name: str, what: str) -> Path:
     if not real.is_file():
         raise HeadError(f"the {what} {found} is not a file")
     return found
+
+
+def find_below(folder: Path, name: str, what: str) -> Path:
+    """As :func:`find_inside`, or else the first file of that name alone in ``folder`` or below it.
+
+    For files of programs that write the path of the machine they run on.
+    """
+    try:
+        return find_inside(folder, name, what)
+    except HeadError:
+        plain = name.strip().replace("\\", "/").rpartition("/")[2]
+        for below, _, files in os.walk(folder):
+            if plain in files:
+                return find_inside(folder, Path(below, plain).relative_to(folder).as_posix(), what)
+        raise
 
 
 def _child(folder: Path, part: str, name: str, what: str) -> Path:

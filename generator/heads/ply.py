@@ -12,10 +12,11 @@ from trimesh.exchange.ply import load_ply
 from trimesh.geometry import triangulate_quads
 
 from generator.errors import HeadError
+from generator.heads.limits import check_mesh_file, read_mesh_bytes
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SKIN
 from generator.heads.paths import find_inside
-from generator.heads.textures import check_image, has_holes
+from generator.heads.textures import Textures
 
 HEADER_BYTES = 1 << 16
 
@@ -28,19 +29,19 @@ def read_ply(path: Path) -> HeadMesh:
     HeadError: the file cannot be parsed, or its texture is missing, outside
         of the folder or not an image.
     """
-    texture = ply_texture(path)
+    texture, textures = ply_texture(path), Textures()
     if texture:
-        check_image(texture)
+        textures.check(texture)
     try:
         with warnings.catch_warnings():
             # numpy's word for a line of numbers that holds something else
             warnings.simplefilter("error", DeprecationWarning)
             # Without a texture the vertices must stay as they are, in step with their colours.
-            data = load_ply(io.BytesIO(path.read_bytes()), fix_texture=bool(texture), skip_materials=True)
+            data = load_ply(io.BytesIO(read_mesh_bytes(path)), fix_texture=bool(texture), skip_materials=True)
             vertices = np.asarray(data.get("vertices", ()), dtype=np.float64)
             triangles = _triangles(data.get("faces"))
             colors = None if texture else _colors(data.get("vertex_colors"), len(vertices))
-    except HeadError:
+    except (HeadError, OSError):
         raise
     except Exception as error:  # trimesh raises whatever a malformed file makes it stumble over
         what = f"{type(error).__name__}: {error}"
@@ -56,7 +57,7 @@ def read_ply(path: Path) -> HeadMesh:
     if texture is None and colors is None:
         problems.append("no texture or vertex colours; drawn as plain skin")
     corner_uv = np.asarray(uv, dtype=np.float32)[triangles] if texture else None
-    cutout = texture is not None and corner_uv is not None and has_holes(texture, corner_uv)
+    cutout = texture is not None and corner_uv is not None and textures.has_holes(texture, corner_uv)
     return HeadMesh(
         vertices=vertices,
         triangles=triangles.astype(np.int32),
@@ -75,6 +76,7 @@ def ply_texture(path: Path) -> Path | None:
     ------
     HeadError: no PLY header, or the image is missing or outside of the folder.
     """
+    check_mesh_file(path)
     with path.open("rb") as file:
         header, end, _ = file.read(HEADER_BYTES).partition(b"end_header")
     if not header.startswith(b"ply") or not end:
@@ -89,6 +91,8 @@ def ply_texture(path: Path) -> Path | None:
 def _triangles(faces: np.ndarray | None) -> np.ndarray:
     if faces is None or not len(faces):
         raise HeadError("the file has no faces; a point cloud cannot be rendered")
+    if min(map(len, faces)) < 3:
+        raise HeadError("a face has fewer than three corners; export the mesh again")
     return np.asarray(faces if np.shape(faces)[1:] == (3,) else triangulate_quads(faces), dtype=np.int64)
 
 

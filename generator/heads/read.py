@@ -9,14 +9,14 @@ from pathlib import Path
 from generator.errors import HeadError
 from generator.escape import printable
 from generator.heads.eyeballs import add_eyeballs
+from generator.heads.fbx import check_fbx
 from generator.heads.gltf import read_gltf
 from generator.heads.head import Head
+from generator.heads.limits import check_mesh_file
 from generator.heads.mesh import HeadMesh
 from generator.heads.obj import read_obj
 from generator.heads.ply import read_ply
 from generator.heads.weld import weld
-
-MAX_MESH_BYTES = 1 << 30
 
 ImportWithBlender = Callable[[Path, Path], Path]
 """(FBX file, scratch folder) -> the GLB that Blender made of it."""
@@ -40,8 +40,7 @@ def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlend
     """
     path = head.mesh_path
     try:
-        if path.stat().st_size > MAX_MESH_BYTES:
-            raise HeadError(f"larger than {MAX_MESH_BYTES >> 30} GB; reduce the mesh")
+        check_mesh_file(path)
         if head.source == "facescape":
             return add_eyeballs(weld(read_obj(path, scratch, texture=head.files[-1])), scratch)
         return weld(_read(path, scratch, import_with_blender))
@@ -62,5 +61,6 @@ def _read(path: Path, scratch: Path, import_with_blender: ImportWithBlender | No
         case ".fbx":
             if import_with_blender is None:
                 raise HeadError("FBX is read by Blender, which is not available here; convert it to GLB")
+            check_fbx(path)
             return read_gltf(import_with_blender(path, scratch), scratch)
     raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB or FBX")

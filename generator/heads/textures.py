@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import struct
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from generator.errors import HeadError
+from generator.escape import quoted
+from generator.heads.limits import MAX_PIXELS, MAX_TEXTURE_PIXELS, check_mesh_file
 
 FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "TGA", "WEBP")
 """What both Pillow and Blender read."""
@@ -26,26 +30,36 @@ HOLES = 0.01
 
 _SAMPLES = 200_000
 
+_JPEG_2000 = (b"\0\0\0\x0cjP  \r\n\x87\n", b"\xff\x4f\xff\x51")
+"""How a file of it begins, and a stream without a file's frame."""
 
-@contextmanager
+_BROKEN = (OSError, SyntaxError, ValueError, EOFError, ArithmeticError, LookupError, struct.error)
+"""What Pillow raises at a damaged file; UnidentifiedImageError is an OSError."""
+
+
+@contextlib.contextmanager
 def open_image(path: Path) -> Iterator[Image.Image]:
     """An image whose header was read and whose size is sane.
 
     Raises
     ------
-    HeadError: not an image of :data:`FORMATS`, broken, or more pixels than
-        Pillow's ``MAX_IMAGE_PIXELS`` (89 million: a decompression bomb).
+    HeadError: not an image of :data:`FORMATS`, broken, or more than
+        MAX_TEXTURE_PIXELS (a decompression bomb).
     """
     try:
+        check_mesh_file(path)
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=FORMATS) as image:
+                if image.width * image.height > MAX_TEXTURE_PIXELS:
+                    size = f"{image.width} x {image.height}"
+                    raise HeadError(f"the texture {path} has too many pixels ({size}); make it smaller")
                 yield image
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise HeadError(f"the texture {path} has too many pixels ({error}); make it smaller") from error
     except UnidentifiedImageError as error:
         raise HeadError(f"the texture {path} is not an image ({', '.join(FORMATS)} expected)") from error
-    except (OSError, SyntaxError, ValueError, EOFError, ArithmeticError, LookupError) as error:
+    except _BROKEN as error:
         raise HeadError(f"the texture {path} is broken ({_line(error)}); replace it") from error
 
 
@@ -59,36 +73,102 @@ def image_size(path: Path) -> tuple[int, int]:
         return image.size
 
 
-def check_image(path: Path) -> None:
-    """Decode all of an image, so that a truncated one is found before a renderer paints it pink."""
+class Textures:
+    """The textures of one head. Each is decoded once, however many materials name it.
+
+    Its methods raise HeadError: an image cannot be used, or all of them have more than MAX_PIXELS.
+    """
+
+    def __init__(self) -> None:
+        self._pixels = 0
+        self._alpha: dict[Path, np.ndarray | None] = {}
+
+    def check(self, path: Path) -> None:
+        """Decode all of an image, so that a truncated one is found before a renderer paints it pink."""
+        self._alpha_of(path)
+
+    def has_holes(self, path: Path, uv: np.ndarray) -> bool:
+        """Does the alpha channel make holes where triangles use the texture?
+
+        Unused corners of an atlas are often transparent, and some exporters leave
+        an alpha channel that is empty throughout: neither makes a cutout.
+
+        Parameters
+        ----------
+        path: image. uv: float [T, 3, 2], v up, of the triangles drawn with it.
+
+        Raises
+        ------
+        HeadError: the image cannot be used, or a texture coordinate is not finite.
+        """
+        if not np.isfinite(uv).all():
+            raise HeadError(
+                f"a texture coordinate of {path.name} is not a finite number; export the mesh again"
+            )
+        alpha = self._alpha_of(path)
+        return alpha is not None and len(uv) > 0 and _holes(alpha, uv)
+
+    def _alpha_of(self, path: Path) -> np.ndarray | None:
+        """uint8 [H, W], None of an image that is solid or transparent throughout."""
+        if path not in self._alpha:
+            with open_image(path) as image:
+                self._pixels += image.width * image.height
+                if self._pixels > MAX_PIXELS:
+                    raise HeadError(f"the textures have more than {MAX_PIXELS:,} pixels; make them smaller")
+                self._alpha[path] = _alpha(image)
+        return self._alpha[path]
+
+
+def check_picture(file: Path | BinaryIO, name: str) -> None:
+    """HeadError: JPEG 2000, which no texture is and whose decoders have been attacked, or too many pixels.
+
+    Of files that Blender reads as it sees fit: what is none of :data:`FORMATS` is left to it.
+    """
+    if isinstance(file, Path):
+        check_mesh_file(file)
+        with file.open("rb") as opened:
+            check_picture(opened, name)
+        return
+    if file.read(12).startswith(_JPEG_2000):
+        raise HeadError(f"the texture {quoted(name)} is JPEG 2000; save it as PNG")
+    file.seek(0)
+    size = (0, 0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        try:
+            with Image.open(file, formats=FORMATS) as image:
+                size = image.size
+        except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+            raise HeadError(
+                f"the texture {quoted(name)} has too many pixels ({error}); make it smaller"
+            ) from error
+        except _BROKEN:
+            return  # Blender says what it thinks of it
+    if size[0] * size[1] > MAX_TEXTURE_PIXELS:
+        raise HeadError(
+            f"the texture {quoted(name)} has too many pixels ({size[0]} x {size[1]}); make it smaller"
+        )
+
+
+def alpha_channel(path: Path) -> np.ndarray | None:
+    """uint8 [H, W], None of an image without one. Raises HeadError as :func:`open_image` does."""
     with open_image(path) as image:
+        if not image.has_transparency_data:
+            return None
+        return np.asarray(image.convert("RGBA").getchannel("A"))
+
+
+def _alpha(image: Image.Image) -> np.ndarray | None:
+    if not image.has_transparency_data:
         # JPEG can decode at an eighth of its size, which reads every byte at a fraction of the time.
         image.draft("RGB", (max(1, image.width // 8), max(1, image.height // 8)))
         image.load()
+        return None
+    alpha = np.asarray(image.convert("RGBA").getchannel("A"))
+    return None if alpha.min() >= OPAQUE or alpha.max() < OPAQUE else alpha
 
 
-def has_holes(path: Path, uv: np.ndarray) -> bool:
-    """Does the alpha channel make holes where triangles use the texture?
-
-    Unused corners of an atlas are often transparent, and some exporters leave
-    an alpha channel that is empty throughout: neither makes a cutout.
-
-    Parameters
-    ----------
-    path: image. uv: float [T, 3, 2], v up, of the triangles drawn with it.
-
-    Raises
-    ------
-    HeadError: the image cannot be used, or a texture coordinate is not finite.
-    """
-    if not np.isfinite(uv).all():
-        raise HeadError(f"a texture coordinate of {path.name} is not a finite number; export the mesh again")
-    with open_image(path) as image:
-        if not image.has_transparency_data or not len(uv):
-            return False
-        alpha = np.asarray(image.convert("RGBA").getchannel("A"))
-    if alpha.min() >= OPAQUE or alpha.max() < OPAQUE:
-        return False
+def _holes(alpha: np.ndarray, uv: np.ndarray) -> bool:
     side = int(np.clip(np.sqrt(_SAMPLES / len(uv)), 3, 64))
     # Cell centres of a barycentric grid: all inside, so that the border of an atlas island does not count.
     a, b = (grid.ravel() for grid in np.mgrid[0:side, 0:side])

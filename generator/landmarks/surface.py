@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -15,6 +14,7 @@ from trimesh.triangles import closest_point, points_to_barycentric
 from generator.errors import HeadError
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
+from generator.heads.textures import alpha_channel
 from generator.plan.views import Views
 
 HOLES = 8
@@ -205,7 +205,7 @@ def _closest_weights(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def _alpha(texture: Path) -> np.ndarray:
-    image = cv2.imread(str(texture), cv2.IMREAD_UNCHANGED)
-    if image is None or image.ndim != 3 or image.shape[2] != 4:
+    alpha = alpha_channel(texture)
+    if alpha is None:
         raise HeadError(f"{texture}: the alpha channel of a cut-out material cannot be read; save it as PNG")
-    return image[..., 3]
+    return alpha

@@ -5,7 +5,6 @@ stand in it."""
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from difflib import get_close_matches
@@ -18,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from generator import registries
 from generator.errors import UsageError
+from generator.escape import shortened
 from generator.plan.setting import Choice
 from generator.plan.settings import (
     SECTIONS,
@@ -32,11 +32,7 @@ from generator.plan.settings import (
     plain,
     section_settings,
 )
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 
 
 @dataclass(frozen=True)
@@ -186,10 +182,12 @@ def _relative(path: Path, root: Path) -> str:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return parse_toml(read_text(path, MAX_CONFIG_BYTES))
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such configuration file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
         raise UsageError(f"{path}: not a TOML configuration: {error}") from error
 
 
@@ -206,7 +204,7 @@ def _validated(values: Mapping[str, Any], where: object) -> BuildConfig:
             known = [one.key for one in all_settings() if [one.section] == section] or [*SECTIONS]
             near = ", ".join(get_close_matches(name, known, 1) or known)
             raise UsageError(f"{where}: {place}: no such {kind}; there is {near}") from error
-        given = "" if first["type"] == "missing" else f", got {first['input']!r}"
+        given = "" if first["type"] == "missing" else f", got {shortened(repr(first['input']))}"
         raise UsageError(f"{where}: {place}: {first['msg']}{given}") from error
     return BuildConfig(**{name: section(**dict(getattr(found, name))) for name, section in SECTIONS.items()})
 

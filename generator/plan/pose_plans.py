@@ -13,12 +13,22 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import DatasetError, UsageError
+from generator.limits import MAX_ROWS
 from generator.names import as_name
 from generator.plan.config import BuildConfig
 from generator.plan.draws import Seed, draw_seed
-from generator.plan.poses import ANGLES, PosePlan, csv_plan, grid_plan, plan_of, sobol_plan, uniform_plan
+from generator.plan.poses import (
+    ANGLES,
+    MAX_CSV_BYTES,
+    PosePlan,
+    csv_plan,
+    grid_plan,
+    plan_of,
+    sobol_plan,
+    uniform_plan,
+)
 from generator.plan.settings import Poses
-from generator.reading import MAX_STATE_BYTES, read_text
+from generator.reading import read_text
 
 HeadName = tuple[str, str]
 """(subject, expression)."""
@@ -67,10 +77,18 @@ def is_drawn(poses: Poses) -> bool:
 
 def plan_poses(config: BuildConfig, heads: Iterable[HeadName]) -> PosePlans:
     """The poses that a configuration asks for. UsageError if they make no sense."""
-    poses = config.poses
+    poses, names = config.poses, list(heads)
     if not is_drawn(poses) or poses.same:
-        return PosePlans(shared_plan(config))
-    return PosePlans(None, {head: _draw(poses, draw_seed(poses.seed, "poses", *head)) for head in heads})
+        plan = shared_plan(config)
+        _check_rows(len(plan) * len(names))
+        return PosePlans(plan)
+    _check_rows(poses.count * len(names))
+    return PosePlans(None, {head: _draw(poses, draw_seed(poses.seed, "poses", *head)) for head in names})
+
+
+def _check_rows(rows: int) -> None:
+    if rows > MAX_ROWS:
+        raise UsageError(f"{rows:,} rows, more than {MAX_ROWS:,}; use fewer heads or poses")
 
 
 def shared_plan(config: BuildConfig) -> PosePlan:
@@ -117,7 +135,7 @@ def read_pose_plans(file: Path) -> PosePlans:
     """The inverse of :func:`poses_csv`. Raises DatasetError if it is not such a file."""
     rows: dict[HeadName | None, list[tuple[list[float], list[int], int]]] = defaultdict(list)
     try:
-        reader = csv.reader(io.StringIO(read_text(file, MAX_STATE_BYTES), newline=""))
+        reader = csv.reader(io.StringIO(read_text(file, MAX_CSV_BYTES), newline=""))
         names = next(reader)
         at = {name: place for place, name in enumerate(names)}
         own, chunked = _HEAD[0] in at, CHUNK in at
@@ -129,7 +147,7 @@ def read_pose_plans(file: Path) -> PosePlans:
         if not rows:
             raise ValueError("it has no rows")
         return _plans(rows, own, chunked)
-    except (OSError, ValueError, KeyError, IndexError, StopIteration, csv.Error) as error:
+    except (OSError, ValueError, ArithmeticError, KeyError, IndexError, StopIteration, csv.Error) as error:
         raise DatasetError(
             f"{file}: not the poses of an earlier build ({error}); build again with --fresh"
         ) from error

@@ -13,14 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import UsageError
+from generator.limits import MAX_POSES
 from generator.plan.draws import Seed
+from generator.reading import check_regular
 
 ANGLES = ("yaw", "pitch", "roll")
 OFF_GRID = -1
 DRAWN_DECIMALS = 4
 """Random angles are rounded when they are drawn, so that a short label is the exact value."""
 
-MAX_POSES = 5_000_000
+MAX_CSV_BYTES = 1 << 30
 _MAX_INDEX = np.iinfo(np.int16).max
 
 
@@ -130,6 +132,7 @@ def csv_plan(path: Path) -> PosePlan:
     """
     path = Path(path)
     try:
+        check_regular(path, MAX_CSV_BYTES)
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
             angle_columns, index_columns = _csv_columns(path, reader.fieldnames)
@@ -142,11 +145,13 @@ def csv_plan(path: Path) -> PosePlan:
                 angles = tuple(_angle(where, name, row[name]) for name in angle_columns)
                 for name, angle in zip(ANGLES, angles, strict=True):
                     _check_limit(name, angle, f"{where}: ")
+                if len(rows) >= MAX_POSES:
+                    raise UsageError(f"{where}: more than {MAX_POSES:,} poses; take some out")
                 if angles in rows:
                     raise UsageError(f"{where}: the pose of line {rows[angles][0]} again; remove one of them")
                 indices = [_index(where, name, row[name]) for name in index_columns]
                 rows[angles] = (reader.line_num, indices or [OFF_GRID] * 3)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise UsageError(f"{path}: cannot be read as a CSV file of poses: {error}") from error
     if not rows:
         raise UsageError(f"{path}: no poses below the header; add at least one row")
@@ -176,10 +181,12 @@ def _axis(name: str, start: float, stop: float, step: float) -> np.ndarray:
     _check_range(name, start, stop)
     if not (math.isfinite(step) and step > 0):
         raise UsageError(f"{name}: the step is {step:g}, expected a number of degrees above 0")
+    if (stop - start) / step > _MAX_INDEX:  # also where there are more than a Decimal has digits
+        raise UsageError(
+            f"{name}: a step of {step:g} gives more than {_MAX_INDEX + 1} values; use a larger step"
+        )
     first, last, width = (Decimal(repr(float(value))) for value in (start, stop, step))
     steps, rest = divmod(last - first, width)
-    if steps > _MAX_INDEX:
-        raise UsageError(f"{name}: {steps + 1} values, more than {_MAX_INDEX + 1}; use a larger step")
     if rest:
         fits = " or ".join(f"{float(value):g}" for value in _steps_that_fit(last - first, width))
         raise UsageError(

@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, Literal, get_type_hints
 
 from generator import registries
+from generator.limits import MAX_HEADS, MAX_POSES, MAX_SEED
 from generator.plan.setting import Choice, Setting, setting
 
 PARAMETRIC = "parametric"
@@ -40,14 +41,14 @@ class Heads:
         PARAMETRIC, 'A head source, or "parametric": heads made on the spot from MakeHuman\'s CC0 data',
         flag="--heads", label="Heads", path=True,
     )  # fmt: skip
-    count: int = setting(3, "Parametric heads to make", low=1, label="Heads", grows=True)
+    count: int = setting(3, "Parametric heads to make", low=1, high=MAX_HEADS, label="Heads", grows=True)
     seed: int = setting(
         0, "The same seed makes the same heads, and draws the same random poses",
-        low=0, label="Seed",
+        low=0, high=MAX_SEED, label="Seed",
     )  # fmt: skip
     sampled_expressions: int = setting(
         0, "Sampled expressions a parametric head, besides the neutral face",
-        low=0, label="Expressions", grows=True,
+        low=0, high=1000, label="Expressions", grows=True,
     )  # fmt: skip
     subjects: tuple[str, ...] | None = setting(
         None, "Only this subject; repeatable",
@@ -107,11 +108,14 @@ class Poses:
         693,
         "Random poses a head",
         low=1,
+        high=MAX_POSES,
         flag="--poses",
         label="Count",
         grows=True,
     )
-    seed: int = setting(0, "The same seed draws the same poses", low=0, label="Seed", grows=True)
+    seed: int = setting(
+        0, "The same seed draws the same poses", low=0, high=MAX_SEED, label="Seed", grows=True
+    )
     path: str | None = setting(
         None, "CSV file with the columns yaw_deg, pitch_deg, roll_deg",
         flag="--poses", label="File", grows=True, path=True,

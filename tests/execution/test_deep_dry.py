@@ -85,7 +85,7 @@ def test_a_grey_picture_with_its_hash_fixed_everywhere(made: DryBuild) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"rubbish", "is no PNG that can be decoded"),
+        (b"rubbish", "cannot be decoded"),
         (grey((16, 17)), "has 16 x 17 pixels, its row says 16 x 16"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -255,7 +256,8 @@ def test_glb_vertex_colours_are_linear(tmp_path: Path, scratch: Path) -> None:
 
 
 def test_fbx_goes_through_the_converter_it_is_given(tmp_path: Path, scratch: Path) -> None:
-    (tmp_path / "head.fbx").write_bytes(b"Kaydara FBX Binary")
+    # The header of version 7.4 and the empty record at the end.
+    (tmp_path / "head.fbx").write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400) + bytes(13))
     (head,) = find_heads(tmp_path).heads
     with pytest.raises(HeadError, match="Blender"):
         read_mesh(head, scratch)

@@ -7,10 +7,8 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
-from generator.errors import DatasetError
-from generator.escape import printable
+from generator.dataset.format.image import decode_image, image_format
 from generator.plan.poses import pose_name
 
 JPEG_QUALITY = 95
@@ -60,35 +58,27 @@ class Sample:
 
     def jpeg(self) -> bytes:
         """The image as JPEG, its own bytes if it is one. Raises DatasetError if it cannot be decoded."""
-        return self._encoded("JPEG", (".jpg", ".jpeg"), quality=JPEG_QUALITY, subsampling=0)
+        return self._encoded("JPEG", quality=JPEG_QUALITY, subsampling=0)
 
     def png(self) -> bytes:
         """The image as PNG, its own bytes if it is one. Raises DatasetError if it cannot be decoded."""
-        return self._encoded("PNG", (".png",))
+        return self._encoded("PNG")
 
-    def _encoded(self, kind: str, suffixes: tuple[str, ...], **options: int) -> bytes:
-        if self.image_suffix in suffixes:
+    def _encoded(self, kind: str, **options: int) -> bytes:
+        name = f"the image of {self.sample_id}"
+        if image_format(self.image, name) == kind:
             return self.image
-        try:
-            picture = Image.open(io.BytesIO(self.image)).convert("RGB")
-        except (UnidentifiedImageError, OSError) as error:
-            raise DatasetError(
-                f"the image of {self.sample_id} cannot be decoded; see `headturn verify`"
-            ) from error
         file = io.BytesIO()
-        picture.save(file, kind, **options)
+        decode_image(self.image, name).save(file, kind, **options)
         return file.getvalue()
 
 
-_BEGINNINGS = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
+_SUFFIXES = {"PNG": ".png", "JPEG": ".jpg"}
 
 
 def suffix_of(encoded: bytes, name: str) -> str:
-    """The suffix that an image gets, by its first bytes: what a file is called says nothing about it.
+    """The suffix that an image gets, by its header: what a file is called says nothing about it.
 
     name: of its row. Raises DatasetError: it is neither PNG nor JPEG.
     """
-    for beginning, suffix in _BEGINNINGS.items():
-        if encoded.startswith(beginning):
-            return suffix
-    raise DatasetError(f"the image of {printable(name)} is neither PNG nor JPEG; see `headturn verify`")
+    return _SUFFIXES[image_format(encoded, f"the image of {name}")]

@@ -15,6 +15,7 @@ from generator.dataset.format.columns import SCHEMA_VERSION, list_of
 from generator.dataset.format.files import one_line, write_atomically
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import heads_version, read_heads
+from generator.dataset.format.parquet import read_table
 from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
 from generator.errors import DatasetError
 from generator.landmarks.topology import FACE_MESH
@@ -91,7 +92,7 @@ def read_anchors(root: Path) -> dict[tuple[str, str], HeadAnchors]:
         heads = [(head.subject, head.expression) for head in read_heads(root)]
         return {name: no_head_anchors(*name) for name in heads}
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
+        table = read_table(path)
     except (OSError, pa.ArrowException, ValueError) as error:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"

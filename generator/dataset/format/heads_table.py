@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from generator.dataset.format.columns import SCHEMA_VERSION, Column, columns_at, list_of
 from generator.dataset.format.files import one_line, write_atomically
 from generator.dataset.format.guard import check_head_texts, dataset_file
+from generator.dataset.format.parquet import read_table
 from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
 from generator.errors import DatasetError
 from generator.escape import quoted
@@ -220,7 +221,7 @@ def heads_version(root: Path) -> str:
 
 def _read(path: Path) -> pa.Table:
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
+        table = read_table(path)
     except (OSError, pa.ArrowException, ValueError) as error:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"

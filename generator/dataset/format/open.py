@@ -15,23 +15,22 @@ import pyarrow.dataset as ds
 
 from generator.dataset.format.columns import ROWS
 from generator.dataset.format.defaults import todays_schema, with_defaults
+from generator.dataset.format.files import one_line
 from generator.dataset.format.guard import check_texts, dataset_file
+from generator.dataset.format.image import image_format, read_image
 from generator.dataset.format.manifest import Manifest
+from generator.dataset.format.parquet import batch_rows, open_parquet
 from generator.dataset.format.part import BATCH, part_schema_of
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import topology_of
 from generator.errors import DatasetError
 from generator.escape import printable
 from generator.landmarks.topology import FACE_MESH, Topology
-from generator.reading import read_limited
 
 OPEN_PARTS = 64
 
 IMAGE_FACTS = ["image_path", "image_sha256"]
 """Columns of :func:`proven_image`, besides image where it is in the table."""
-
-MAX_IMAGE_BYTES = 1 << 28
-"""Of one encoded image: more than a PNG of the largest resolution there is."""
 
 
 def read_rows(
@@ -48,24 +47,37 @@ def read_rows(
     try:
         # A dataset keeps the footers of all its files, 100 kB each, so it is opened piece by piece.
         for start in range(0, len(parts), OPEN_PARTS):
-            paths = [str(dataset_file(root, part.path)) for part in parts[start : start + OPEN_PARTS]]
+            files = [dataset_file(root, part.path) for part in parts[start : start + OPEN_PARTS]]
+            scan, paths = _scan_options(files), [str(file) for file in files]
             data = ds.dataset(paths, format="parquet")
             where_from = paths[0] if len(paths) == 1 else root
             today = todays_schema(data.schema, paths[0])
             if set(columns or today.names) <= set(data.schema.names):
-                for batch in data.to_batches(columns=columns, filter=where, batch_size=BATCH):
+                for batch in data.to_batches(columns=columns, filter=where, **scan):
                     check_texts(batch, where_from)
                     yield batch
                 continue
             stored = [name for name in columns or today.names if name in data.schema.names]
             # Without any column a batch would not know how long it is.
-            for batch in data.to_batches(columns=stored or ["sample_id"], filter=where, batch_size=BATCH):
+            for batch in data.to_batches(columns=stored or ["sample_id"], filter=where, **scan):
                 check_texts(batch, where_from)
                 yield with_defaults(batch, today, columns or today.names)
     except (OSError, pa.ArrowException) as error:
         # The whole message on one line: its first sentence does not name the file.
         what = " ".join(str(error).split())
         raise DatasetError(f"{root}: {what}; `headturn verify` says what is wrong") from error
+
+
+def _scan_options(paths: Sequence[Path]) -> dict[str, int]:
+    """How many rows of these parts are read at once, and ahead. Raises as read_rows does."""
+    most = BATCH
+    for path in paths:
+        try:
+            with open_parquet(path) as file:
+                most = min(most, batch_rows(file.metadata, BATCH))
+        except ValueError as error:
+            raise DatasetError(f"{path}: {one_line(error)}; `headturn verify` says what is wrong") from error
+    return {"batch_size": most} if most == BATCH else {"batch_size": most, "batch_readahead": 0}
 
 
 def dataset_topology(root: Path, manifest: Manifest) -> Topology:
@@ -108,20 +120,20 @@ def read_samples(root: Path, manifest: Manifest, sample_ids: Sequence[str]) -> d
 
 
 def image_bytes(root: Path, row: Mapping[str, Any]) -> bytes:
-    """The encoded image of one row, from the table or from its file.
+    """The encoded image of one row, from the table or from its file: a PNG or JPEG, by its header.
 
     Raises DatasetError: the dataset was built without images, or the file is gone or lies elsewhere.
     """
     if row.get("image"):
-        return row["image"]["bytes"]
+        encoded: bytes = row["image"]["bytes"]
+        image_format(encoded, f"{root}: an embedded image")
+        return encoded
     if not row["image_path"]:
         raise DatasetError(f"{root}: built with images = none; build with files or embedded to see them")
     path = dataset_file(root, row["image_path"])
-    try:
-        return read_limited(path, MAX_IMAGE_BYTES)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DatasetError(f"{path}: cannot be read ({reason}); see `headturn verify`") from error
+    encoded = read_image(path)
+    image_format(encoded, str(path))
+    return encoded
 
 
 def proven_image(root: Path, row: Mapping[str, Any], sample_id: str) -> bytes:

@@ -18,6 +18,7 @@ from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import file_sha256, one_line, write_atomically, write_files
 from generator.dataset.format.guard import check_texts
+from generator.dataset.format.parquet import iter_batches, open_parquet
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import check_name, image_mode
 from generator.dataset.format.unit_rows import UnitRows, unit_table
@@ -72,8 +73,8 @@ def iter_stored(path: Path) -> Iterator[pa.RecordBatch]:
 
     Raises DatasetError: the file is missing, cut short or damaged.
     """
-    with reading(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
-        yield from file.iter_batches(batch_size=BATCH)
+    with reading(path):
+        yield from iter_batches(path, BATCH)
 
 
 def iter_checked(path: Path) -> Iterator[pa.RecordBatch]:
@@ -92,8 +93,8 @@ def iter_part(path: Path) -> Iterator[pa.RecordBatch]:
 
 def part_schema_of(path: Path) -> pa.Schema:
     """Schema of one part as it is stored, with its metadata. Raises as :func:`iter_stored` does."""
-    with reading(path):
-        return pq.read_schema(path)
+    with reading(path), open_parquet(path) as file:
+        return file.schema_arrow
 
 
 def read_part(path: Path) -> pa.Table:

@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from generator.dataset.format.exr_header import check_exr
+from generator.dataset.format.files import one_line
 from generator.errors import DatasetError, UsageError, WorkerError
 from generator.plan.passes import OBJECT_INDEX, Pass
+from generator.process import native_silence
 from generator.registries import PASSES
 
 _HEADER = {
@@ -72,15 +75,27 @@ def read_channels(path: Path) -> dict[str, np.ndarray]:
     Raises DatasetError if the file is missing, damaged or no OpenEXR.
     """
     exr = _openexr()
-    if not path.is_file():
+    if not path.exists():
         raise DatasetError(f"{path}: is missing; run `headturn build` again")
     try:
-        with exr.File(str(path), separate_channels=True) as file:
+        check_exr(path)
+        # It says on stdout what it could not decode, and leaves that out.
+        with native_silence(1, 2), exr.File(str(path), separate_channels=True) as file:
             # Blender 5 writes a part a pass, 4.x one part with all of them.
             parts = [part.channels for part in file.parts]
-            return {name: np.array(found.pixels) for part in parts for name, found in part.items()}
-    except RuntimeError as error:
-        raise DatasetError(f"{path}: not a readable OpenEXR; run `headturn build` again") from error
+            channels = {name: np.array(found.pixels) for part in parts for name, found in part.items()}
+        if not all(values.ndim == 2 and values.dtype.kind == "f" for values in channels.values()):
+            raise ValueError("a channel is missing or cut off")
+        return channels
+    except OSError as error:
+        raise DatasetError(
+            f"{path}: cannot be read ({error.strerror}); run `headturn build` again"
+        ) from error
+    # Its library raises what it likes at a damaged file.
+    except (RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError) as error:
+        raise DatasetError(
+            f"{path}: not a readable OpenEXR ({one_line(error)}); run `headturn build` again"
+        ) from error
 
 
 def passes_sha256(channels: Mapping[str, np.ndarray]) -> str:

@@ -21,6 +21,7 @@ from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest, parts_configuration
 from generator.dataset.format.open import as_array, dataset_topology
+from generator.dataset.format.parquet import open_parquet
 from generator.dataset.format.part import iter_stored, part_schema_of, reading
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer, part_schema
@@ -94,9 +95,9 @@ class PartChecker:
         try:
             path = dataset_file(self._root, part.path)
             size = path.stat().st_size
-            with reading(path):
-                footer = pq.read_metadata(path)
-            rows, schema = footer.num_rows, footer.schema.to_arrow_schema()
+            with reading(path), open_parquet(path) as file:
+                footer, schema = file.metadata, file.schema_arrow
+            rows = footer.num_rows
         except (OSError, HeadturnError) as error:
             found.add("part sizes", [f"{part.path} cannot be read: {error}"])
             return found

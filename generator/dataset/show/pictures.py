@@ -9,11 +9,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont, UnidentifiedImageError
+from PIL import Image, ImageDraw, ImageFont
 
 from generator.dataset.format.dataset_poses import DatasetPoses, read_dataset_poses
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.heads_table import HeadRow, read_heads
+from generator.dataset.format.image import decode_image
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import image_bytes, read_samples
 from generator.dataset.format.row_cameras import RowCameras
@@ -188,12 +189,7 @@ def shown_poses(plan: PosePlan) -> list[int]:
 
 
 def _picture(dataset: Path, row: dict) -> Image.Image:
-    try:
-        return Image.open(io.BytesIO(image_bytes(dataset, row))).convert("RGB")
-    except (UnidentifiedImageError, OSError) as error:
-        raise DatasetError(
-            f"{dataset}: the image of {row['sample_id']} cannot be decoded; see `headturn verify`"
-        ) from error
+    return decode_image(image_bytes(dataset, row), f"{dataset}: the image of {row['sample_id']}")
 
 
 def _mark_detected(draw: ImageDraw.ImageDraw, row: dict, fitted: Fitted) -> None:

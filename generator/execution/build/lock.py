@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from generator.errors import DatasetError
+from generator.reading import MAX_CONFIG_BYTES, parse_json, read_limited
 
 LOCK_FILE = ".lock"
 
@@ -76,7 +77,7 @@ def _open_locked(path: Path) -> BinaryIO:
 
 def _refusal(root: Path, path: Path) -> str:
     try:
-        holder = json.loads(path.read_text(encoding="utf-8"))
+        holder = parse_json(read_limited(path, MAX_CONFIG_BYTES))
         who = f" (process {holder['pid']} on {holder['host']})"
     except (OSError, ValueError, KeyError, TypeError):
         who = ""

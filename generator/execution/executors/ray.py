@@ -22,6 +22,7 @@ from generator.execution.lanes.scratch import remove_leftovers, scratch_folder
 from generator.execution.lanes.slot import ATTEMPTS, LaneSlot, Outcome
 from generator.messages import BuildOrder, LaneOrder, from_json, to_json
 from generator.process import available_cores
+from generator.reading import parse_json
 
 IN_FLIGHT = 2
 """Orders an actor has at a time: one to work on, one that waits at its door."""
@@ -44,7 +45,7 @@ class LaneActor:
     """
 
     def __init__(self, options: str) -> None:
-        values = json.loads(options)
+        values = parse_json(options)
         self._stack = ExitStack()
         scratch = self._stack.enter_context(scratch_folder())
         core = self._stack.enter_context(_own_core())
@@ -56,7 +57,7 @@ class LaneActor:
     def run(self, order: str) -> str:
         """Carry out one order. Returns {"receipt", "error", "attempts", "log"} or {"fatal"}."""
         try:
-            outcome = self._slot.run(from_json(json.loads(order)), lambda: None)
+            outcome = self._slot.run(from_json(parse_json(order)), lambda: None)
         except DatasetError as error:
             return json.dumps({"fatal": str(error)})
         values = {key: value for key, value in vars(outcome).items() if key not in ("order", "receipt")}
@@ -157,7 +158,7 @@ class RayExecutor:
 
     def _outcome(self, ready: Any, order: LaneOrder) -> Outcome:
         try:
-            values = json.loads(self._ray.get(ready))
+            values = parse_json(self._ray.get(ready))
         except self._ray.exceptions.RayError as error:
             # Not the unit's own failure, which comes as a value: the actor died, again and again.
             told = str(error).strip()

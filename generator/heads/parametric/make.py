@@ -24,6 +24,7 @@ from generator.heads.parametric.folder import write_description, write_materials
 from generator.heads.parametric.identity import Identity, sample_identity
 from generator.heads.parametric.skin import paint_skin
 from generator.heads.parametric.source import data_folder
+from generator.limits import MAX_HEADS, MAX_SEED
 from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
 from generator.sealed import SEAL, unsealed
 
@@ -68,10 +69,12 @@ def make_heads(
     """
     if count < 1:
         raise UsageError(f"count is {count}: ask for at least 1 head")
-    if seed < 0:
-        raise UsageError(f"seed is {seed}: it must be 0 or larger")
+    if not 0 <= seed <= MAX_SEED:
+        raise UsageError(f"seed is {seed}: it must be from 0 to {MAX_SEED}")
     if expressions < 0:
         raise UsageError(f"expressions is {expressions}: it must be 0 or larger")
+    if count * (1 + expressions) > MAX_HEADS:
+        raise UsageError(f"{count} heads with {expressions} expressions each: more than {MAX_HEADS:,} meshes")
     data_folder()
     _prepare(out)
     folders = []

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Sequence
@@ -13,8 +12,14 @@ from typing import Any
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest
 from generator.dataset.show.report.atlas import Atlas
+from generator.errors import DatasetError
+from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
 
 LOG_FILE = "build.log"
+MAX_SECONDS = 1e9
+"""Of a stage of a unit; more was not measured."""
+MAX_STAGES = 64
+"""There are eight."""
 
 
 def head_facts(
@@ -57,17 +62,38 @@ def build_facts(root: Path, manifest: Manifest) -> dict[str, Any]:
 
 
 def timings(log: Path) -> dict[str, float] | None:
-    """Lane seconds a stage, summed over the units that the log of the build names; None without any."""
-    if not log.is_file():
+    """Lane seconds a stage, summed over the units that the log of the build names; None without any.
+
+    Lines that say something else are passed over, and such as a build did not live to end.
+    Raises DatasetError: the log is no regular file, too large, or cannot be read.
+    """
+    if not log.exists():
         return None
+    try:
+        lines = read_limited(log, MAX_STATE_BYTES).decode("utf-8", "replace").splitlines()
+    except OSError as error:
+        raise DatasetError(f"{log}: cannot be read ({error.strerror}); remove it") from error
+    except ValueError as error:
+        raise DatasetError(f"{log}: {error}; remove it") from error
     total: dict[str, float] = defaultdict(float)
-    for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
-        _, _, event = line.partition(" ")
-        kind, _, facts = event.partition(" ")
-        if kind == "unit":
-            for stage, seconds in json.loads(facts).get("seconds", {}).items():
+    for line in lines:
+        for stage, seconds in _seconds(line).items():
+            if stage in total or len(total) < MAX_STAGES:
                 total[stage] += seconds
     return {stage: round(seconds, 2) for stage, seconds in total.items()} or None
+
+
+def _seconds(line: str) -> dict[str, float]:
+    """Those of a unit; none of any other line."""
+    _, _, event = line.partition(" ")
+    kind, _, facts = event.partition(" ")
+    if kind != "unit":
+        return {}
+    try:
+        stages = parse_json(facts)["seconds"].items()
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    return {stage: value for stage, value in stages if isinstance(value, float) and 0 <= value < MAX_SECONDS}
 
 
 def why_no_atlas(heads: Sequence[HeadRow], atlas: Atlas) -> str:

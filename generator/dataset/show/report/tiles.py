@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.image import decode_image
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import image_bytes, read_samples
 from generator.dataset.format.row_cameras import RowCameras
 from generator.dataset.format.schema import sample_id
 from generator.dataset.show.fitted import Fitted
 from generator.dataset.show.pictures import PAPER, shown_poses
-from generator.errors import DatasetError
 from generator.landmarks.topology import Topology
 from generator.plan.poses import ANGLES, PosePlan, pose_name
 
@@ -111,12 +110,7 @@ def _points(points: np.ndarray, row: Mapping[str, Any]) -> list[int]:
 
 
 def _picture(root: Path, row: Mapping[str, Any], size: int) -> str:
-    try:
-        picture = Image.open(io.BytesIO(image_bytes(root, row))).convert("RGB")
-    except (UnidentifiedImageError, OSError) as error:
-        raise DatasetError(
-            f"{root}: the image of {row['sample_id']} cannot be decoded; see `headturn verify`"
-        ) from error
+    picture = decode_image(image_bytes(root, row), f"{root}: the image of {row['sample_id']}")
     file = io.BytesIO()
     tile = Fitted.of(row["width"], row["height"], size).paste(picture, PAPER)
     tile.save(file, "JPEG", quality=QUALITY)
