@@ -28,7 +28,7 @@ demo: $(VENV)/.build
 	@echo "== verifying"
 	$(BIN)/headturn verify $(DEMO)
 	@echo "== the first rows, as any reader sees them"
-	$(BIN)/python -c "import pyarrow.parquet as pq; t = pq.read_table('$(DEMO)/data', columns=['sample_id', 'yaw_deg', 'pitch_deg', 'roll_deg', 'detected']); print(*t.slice(0, 5).to_pylist(), sep='\n')"
+	$(BIN)/python -c "import pyarrow.parquet as pq; t = pq.read_table('$(DEMO)/data', partitioning=None, columns=['sample_id', 'yaw_deg', 'pitch_deg', 'roll_deg', 'detected']); print(*t.slice(0, 5).to_pylist(), sep='\n')"
 	$(BIN)/headturn report $(DEMO)
 	@echo "== look at $(DEMO)/contact_sheet.png, $(DEMO)/detection_rate.png and, in a browser, $(DEMO)/report.html"
 

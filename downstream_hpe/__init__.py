@@ -11,12 +11,12 @@ Dependence points one way (tests/downstream_hpe/test_rooms.py holds it):
 What most programs want is here by name, and read from its room when it is first asked for.
 """
 
-from __future__ import annotations
-
-import importlib
-from typing import TYPE_CHECKING, Any
-
+# Nothing is imported here, not even of __future__: whoever typed python -m downstream_hpe.cli has the current
+# folder as the first place of modules until that command says otherwise.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from downstream_hpe.errors import HpeError
     from downstream_hpe.prediction.predictor import Pose, Predictor
     from downstream_hpe.tables.rows import Rows, read_rows
@@ -34,7 +34,9 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    import importlib
+
     # PEP 562: importing the package must not cost what a part of it needs.
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

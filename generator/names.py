@@ -45,6 +45,15 @@ def name_problem(text: str) -> str:
     return "is a device in Windows" if _DEVICE.fullmatch(text) else ""
 
 
+def is_text(text: str) -> bool:
+    """Can it be written as UTF-8? The name of a file may hold bytes that cannot be read as text."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def as_name(text: object) -> Name:
     """Text as a name. Raises ValueError, with what is wrong, if it is none."""
     if not isinstance(text, str):

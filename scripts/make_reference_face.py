@@ -43,7 +43,8 @@ def measured_faces() -> tuple[np.ndarray, np.ndarray]:
         grid = ["--yaw=-15,15,15", "--pitch=-15,15,15", "--roll=0,0,10"]
         command = [sys.executable, "-m", "generator.cli", *build.split(), *grid, "--out", f"{folder}/d"]
         subprocess.run(command, check=True)
-        table = pq.read_table(f"{folder}/d/data", columns=["subject", "rotation", "detected", "landmarks"])
+        columns = ["subject", "rotation", "detected", "landmarks"]
+        table = pq.read_table(f"{folder}/d/data", columns=columns, partitioning=None)
         anchors = [a.points for a in read_anchors(Path(folder) / "d").values()]
     seen = table.filter(table["detected"])
     rotations = np.stack(seen["rotation"].to_numpy()).reshape(-1, 3, 3)

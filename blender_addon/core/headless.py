@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from generator.errors import HeadturnError
+from generator.interpreter import python_environment
 
 from .host import check_host, find_host, host_command
 from .process import HostProcess
@@ -41,7 +42,7 @@ def run(arguments: Sequence[str], *, preference: str = "", blender: str = "") ->
 
 def _pass_through(command: list[str]) -> int:
     sys.stdout.flush()
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    process = subprocess.Popen(command, env=python_environment(), stdin=subprocess.DEVNULL)
     while True:
         try:
             return _shell_code(process.wait())

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.errors import UsageError
+from generator.interpreter import other_python_command, python_environment
 from generator.reading import parse_json
 
 INSTALL = "python3.11 -m venv headturn && headturn/bin/pip install 'headturn[build]'"
@@ -69,10 +70,13 @@ def find_host(preference: str, beside: Path | None, environ: Mapping[str, str] =
             python = _python(Path(os.path.expanduser(text)))
             if python is None:
                 raise HostMissing(f"{found_by}: {text} is no Python and no environment that has one")
-            return Host((str(python), "-m", "generator.cli"), found_by)
+            return _host(python, found_by)
     if beside is not None and (python := _python(beside / ".venv")) is not None:
-        return Host((str(python), "-m", "generator.cli"), f"{beside / '.venv'}")
-    if found := shutil.which("headturn", path=environ.get("PATH")):
+        return _host(python, f"{beside / '.venv'}")
+    # Full paths alone: others lead to the folder one happens to be in, which is anybody's.
+    folders = filter(os.path.isabs, environ.get("PATH", "").split(os.pathsep))
+    found = shutil.which("headturn", path=os.pathsep.join(folders))
+    if found is not None and os.path.isabs(found):
         return Host((found,), "PATH")
     raise HostMissing(
         f"no Python with Headturn was found: run  {INSTALL}  and name that folder in the add-on's "
@@ -85,6 +89,7 @@ def check_host(host: Host) -> HostFacts:
     try:
         done = subprocess.run(
             [*host.command, "environment"],
+            env=python_environment(),
             capture_output=True,
             text=True,
             timeout=_CHECK_TIMEOUT_S,
@@ -108,6 +113,10 @@ def host_command(host: Host, facts: HostFacts, arguments: list[str], blender: st
     if renders and facts.bpy is None and "--blender" not in arguments and blender:
         arguments = [*arguments, "--blender", blender]
     return [*host.command, *arguments]
+
+
+def _host(python: Path, found_by: str) -> Host:
+    return Host(tuple(other_python_command(str(python), "generator.cli")), found_by)
 
 
 def _python(path: Path) -> Path | None:

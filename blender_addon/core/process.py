@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import IO, Any
 
 from generator.errors import WorkerError
+from generator.interpreter import python_environment
 from generator.reading import parse_json
 
 _LOG_LINES = 40
@@ -32,6 +33,7 @@ class HostProcess:
         try:
             self._process = subprocess.Popen(
                 command,
+                env=python_environment(),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,

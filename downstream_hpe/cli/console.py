@@ -17,7 +17,7 @@ from downstream_hpe.errors import HpeError
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output on stdout.")]
 
 # Without emoji, which rich would make of what stands between colons, as in webcam:-1: expected ...
-err = Console(stderr=True, emoji=False)
+err = Console(stderr=True, emoji=False, markup=False)
 
 
 def note(text: str) -> None:

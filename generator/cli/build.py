@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -163,7 +164,7 @@ def _print_result(result: Any, seconds: float, as_json: bool) -> None:
         f"tables    {result.root / 'data'}",
         *(f"picture   {path}" for path in result.pictures),
         f"read      pandas.read_parquet({str(result.root / 'data')!r})",
-        f"check     headturn verify {result.root}",
+        f"check     headturn verify {shlex.quote(str(result.root))}",
     ]
     if result.skipped:
         lines.append(f"left out  {plural(len(result.skipped), 'head')}: see {result.root / 'manifest.json'}")

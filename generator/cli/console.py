@@ -13,9 +13,9 @@ EXIT_INCOMPLETE = 3
 """Finished, but something was left out."""
 
 # A pipe has no width of its own; 80 columns would cut every table.
-# Without emoji: a path may hold ":x:".
-out = Console(width=None if sys.stdout.isatty() else 160, emoji=False)
-err = Console(stderr=True, emoji=False)
+# Without emoji and markup: a path may hold ":x:" or "[x]".
+out = Console(width=None if sys.stdout.isatty() else 160, emoji=False, markup=False)
+err = Console(stderr=True, emoji=False, markup=False)
 
 
 def plural(count: int, noun: str) -> str:

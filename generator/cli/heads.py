@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,7 +37,8 @@ def heads_make(
         made = make_heads(
             folder, count=count, seed=seed, expressions=expressions, progress=lambda _: reporter.advance()
         )
-    out.print(f"{len(made)} heads in {folder}; build with: headturn build --heads {folder} --out dataset")
+    command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
+    out.print(f"{len(made)} heads in {folder}; build with: {command}", highlight=False, soft_wrap=True)
 
 
 @heads_app.command("list", epilog="Example: headturn heads list /data/facescape")

@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from generator import registries
 from generator.errors import HeadError, UsageError
+from generator.escape import quoted
 from generator.heads.facescape import EXPRESSIONS, expression_number
 from generator.heads.folders import SUFFIXES, UNKNOWN_LICENSE
 from generator.heads.head import Finder, Head, HeadSource, SkippedHead
 from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
+from generator.names import is_text
 
 
 def find_heads(
@@ -46,6 +49,8 @@ def find_heads(
         path = path.resolve()
     if not path.exists():
         raise UsageError(f"no such file or folder: {path}")
+    if not is_text(str(path)):
+        raise UsageError(f"{path}: the path holds bytes that are no text; rename that folder")
     if units is not None and units not in MM_PER_UNIT:
         raise UsageError(f"unknown unit {units!r}; one of {', '.join(MM_PER_UNIT)}")
     for text, option in ((up, "--up"), (forward, "--forward")):
@@ -63,6 +68,7 @@ def find_heads(
         raise UsageError(
             f"{path} is {kind}, whose licence is {finder.license}; remove --license and --redistributable"
         )
+    heads, skipped = _recordable(heads, skipped)
     if expressions is not None:
         heads, skipped = _select(heads, skipped, expressions)
     given = [
@@ -78,6 +84,41 @@ def find_heads(
         for head in heads
     ]
     return HeadSource(path, kind, tuple(given), tuple(skipped))
+
+
+def _recordable(heads: list[Head], skipped: list[SkippedHead]) -> tuple[list[Head], list[SkippedHead]]:
+    """Heads that a dataset can name: what is written down of them is text, and no two share a file's name.
+
+    Some file systems do not tell upper case from lower; of names that are one there the first is taken.
+    """
+    first: dict[tuple[str, ...], str] = {}
+    taken, others = [], []
+    for head in heads:
+        if reason := _no_text(head) or _no_other_name(head, first):
+            others.append(SkippedHead(head.subject, head.expression, head.mesh_path, reason))
+        else:
+            taken.append(head)
+    return taken, [*skipped, *others]
+
+
+def _no_text(head: Head) -> str:
+    for text in (head.license, head.attribution, *map(str, head.files)):
+        if not is_text(text):
+            return f"{quoted(Path(text).name)} holds bytes that are no text; rename it or write it in UTF-8"
+    return ""
+
+
+def _no_other_name(head: Head, first: dict[tuple[str, ...], str]) -> str:
+    subject, expression = _plain(head.subject), _plain(head.expression)
+    for key, name in (((subject,), head.subject), ((subject, expression), head.expression)):
+        if (other := first.setdefault(key, name)) != name:
+            return f"{quoted(name)} and {quoted(other)} are one file name on some systems; rename one"
+    return ""
+
+
+def _plain(name: str) -> str:
+    """What is left of a name where upper and lower case, or ways to write a character, are not told apart."""
+    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def _search(path: Path) -> tuple[str, Finder, list[Head], list[SkippedHead]]:

@@ -119,7 +119,9 @@ def poses_csv(plans: PosePlans) -> str:
     """
     heads: Iterable[HeadName | None] = [None] if plans.shared is not None else sorted(plans.by_head)
     names = [*(_HEAD if plans.shared is None else ()), *_COLUMNS, *([CHUNK] if plans.chunks else [])]
-    lines = [",".join(names)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
     for head in heads:
         plan = plans.shared if head is None else plans.by_head[head]
         assert plan is not None, "a plan is shared, or its head has it"
@@ -127,8 +129,8 @@ def poses_csv(plans: PosePlans) -> str:
         if plans.chunks:
             columns.append(plans.chunks[head].tolist())
         before = [] if head is None else list(head)
-        lines += [",".join([*before, *map(repr, row)]) for row in zip(*columns, strict=True)]
-    return "\n".join(lines) + "\n"
+        writer.writerows([*before, *map(repr, row)] for row in zip(*columns, strict=True))
+    return text.getvalue()
 
 
 def read_pose_plans(file: Path) -> PosePlans:

@@ -22,9 +22,16 @@ class RealBlender:
     windowed: tuple[str, ...]
     environment: dict[str, str]
 
-    def run(self, *arguments: str, check: bool = True, timeout: float = 200, **environment: str):
+    def run(
+        self,
+        *arguments: str,
+        check: bool = True,
+        timeout: float = 200,
+        cwd: Path | None = None,
+        **environment: str,
+    ):
         """Run it to its end; returns what it said and its exit code."""
-        return self._run([self.executable, *arguments], check, timeout, environment)
+        return self._run([self.executable, *arguments], check, timeout, environment, cwd)
 
     def start(self, *arguments: str) -> subprocess.Popen[str]:
         """Run it beside the test."""
@@ -41,9 +48,17 @@ class RealBlender:
         flags = ["--enable-event-simulate", "--window-geometry", "0", "0", "1280", "720"]
         return self._run([*self.windowed, *flags, *arguments], False, timeout, environment)
 
-    def _run(self, command: list[str], check: bool, timeout: float, environment: dict[str, str]):
+    def _run(
+        self,
+        command: list[str],
+        check: bool,
+        timeout: float,
+        environment: dict[str, str],
+        cwd: Path | None = None,
+    ):
         done = subprocess.run(
             command,
+            cwd=cwd,
             capture_output=True,
             text=True,
             timeout=timeout,

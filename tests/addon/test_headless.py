@@ -96,6 +96,24 @@ def test_without_the_extension_a_script_does_the_same(real_blender: RealBlender,
     assert real_blender.run(*flags, "verify", "/nowhere", check=False).returncode == 1
 
 
+def test_modules_beside_the_data_are_not_imported(
+    real_blender: RealBlender, small_build: Path, tmp_path: Path
+) -> None:
+    """Not by Blender, not by the host, not by a render worker in that Blender."""
+    names = {*sys.stdlib_module_names, "bpy", "mathutils", "numpy", "cv2", "pyarrow", "mediapipe"}
+    code = f"open({str(tmp_path / 'mark')!r}, 'a').write(__name__)\n1 / 0\n"
+    for name in names:
+        (tmp_path / f"{name}.py").write_text(code)
+    command = [sys.executable, "-m", "generator.cli", "build", str(small_build / "small.toml"), "--out", "d"]
+    command += ["--workers", "1", "--blender", real_blender.executable]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    real_blender.run("--background", "--command", "headturn", "verify", "d", cwd=tmp_path)
+    script = str(ROOT / "blender_addon" / "headless.py")
+    flags = ("--background", "--factory-startup", "--python-exit-code", "1", "--python", script, "--")
+    real_blender.run(*flags, "verify", "d", cwd=tmp_path)
+    assert not (tmp_path / "mark").exists(), (tmp_path / "mark").read_text()
+
+
 def test_another_blender_renders_and_the_labels_stay(blender_command: Path, small_build: Path) -> None:
     out = small_build / "other"
     command = [sys.executable, "-m", "generator.cli", "build", "small.toml", "--out", str(out)]

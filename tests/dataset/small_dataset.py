@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -159,10 +160,11 @@ def build_dataset(
     schema = part_schema(images, VERSIONS, configuration_digest(common_values(configuration)))
     root.mkdir(parents=True)
     parts = []
-    for head in heads:
+    for number, head in enumerate(heads):
+        name = head.subject if re.fullmatch(r"\w+", head.subject, re.ASCII) else f"h{number}"
         for start in range(0, len(plan), chunk):
             unit = unit_rows(head, plan, slice(start, start + chunk), camera)
-            parts.append(commit_unit(unit, schema, root, f"{head.subject}-{start}"))
+            parts.append(commit_unit(unit, schema, root, f"{name}-{start}"))
     seen_by = {
         "lens_mm": camera.lens_mm,
         "distance_mm": camera.distance_mm,

@@ -38,7 +38,7 @@ def check_image(image: Image.Image) -> None:
 
 @pytest.fixture(scope="module")
 def embedded(tmp_path_factory, build) -> Path:
-    root = tmp_path_factory.mktemp("readers") / "dataset"
+    root = tmp_path_factory.mktemp("readers") / "seed=7" / "subject=x" / "dataset"
     build(root, "embedded")
     return root
 
@@ -75,11 +75,14 @@ def test_polars(embedded, pattern):
 
 def test_duckdb(embedded):
     duckdb = pytest.importorskip("duckdb")
+    # Of itself it makes columns of folders that are called key=value.
+    files = f"read_parquet('{embedded}/data/**/*.parquet', hive_partitioning=false)"
     with duckdb.connect() as connection:
-        rows = connection.sql(f"SELECT * FROM '{embedded}/data/**/*.parquet'").fetchnumpy()
+        rows = connection.sql(f"SELECT * FROM {files}").fetchnumpy()
         found = connection.sql(
-            f"SELECT count(*) FROM '{embedded}/data/**/*.parquet' WHERE detected AND abs(yaw_deg) <= 20"
+            f"SELECT count(*) FROM {files} WHERE detected AND abs(yaw_deg) <= 20"
         ).fetchall()
+    assert rows["subject"][0] in ("s1", "s2") and "seed" not in rows
     check(
         np.stack([rows[name] for name in NAMES], axis=1),
         np.array(rows["rotation"].tolist()),

@@ -80,7 +80,7 @@ def test_a_killed_process_is_one_line(build, tmp_path):
     def kill_the_first() -> None:
         for _ in range(1000):
             for child in psutil.Process().children():
-                if any("multiprocessing-fork" in word for word in child.cmdline()):
+                if any("generator.pool" in word for word in child.cmdline()):
                     child.kill()
                     return
             time.sleep(0.01)

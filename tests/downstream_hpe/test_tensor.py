@@ -57,6 +57,16 @@ def test_tensor_is_the_normalised_landmarks_of_each_cell(dataset, heads):
     np.testing.assert_array_equal(tensor.axes_deg[2], ideal.AXES[2])
 
 
+def test_folders_called_key_value_are_folders(tmp_path, heads):
+    folder = tmp_path / "seed=7" / "subject=x" / "expression=y" / "ds"
+    ideal.write(folder / "data" / "train" / "part-1.parquet", heads["amy"])
+    ideal.write(folder / "data" / "train" / "part-2.parquet", heads["bob"])
+    ideal.write(folder / "heads.parquet", {"subject": np.array(["amy", "bob"])}, {})
+    assert open_tensor(folder).heads == ("amy/neutral", "bob/neutral")
+    assert set(read_rows(folder).subjects) == {"amy", "bob"}
+    assert set(read_rows(folder / "data" / "train" / "part-1.parquet").subjects) == {"amy"}
+
+
 def test_normalisations():
     landmarks = np.random.default_rng(0).normal(size=(4, 468, 3)) * 50 + 100
     paper = normalise(landmarks)

@@ -40,8 +40,12 @@ def write(source: Source, folder: Path) -> str:
     """
     require_images(source, "300w-lp")
     names: dict[str, list[str]] = {}
+    stems: dict[str, tuple[str, str]] = {}
     for sample in source.samples():
-        name = f"{sample.split}/{sample.subject}_{sample.expression}_{sample.pose}"
+        stem = f"{sample.subject}_{sample.expression}"
+        while stems.setdefault(stem, sample.head) != sample.head:
+            stem += "~"  # expression b_c of subject a, and c of a_b
+        name = f"{sample.split}/{stem}_{sample.pose}"
         (folder / sample.split).mkdir(exist_ok=True)
         (folder / f"{name}.jpg").write_bytes(sample.jpeg())
         mat = io.BytesIO()

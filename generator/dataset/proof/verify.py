@@ -4,12 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +29,8 @@ from generator.dataset.proof.part_checks import PartChecker, PartFindings
 from generator.dataset.proof.row_checks import row_checks
 from generator.dataset.proof.verify_report import Check, VerifyReport
 from generator.dataset.show.detection import DetectionTally
-from generator.errors import DatasetError, HeadturnError
+from generator.errors import DatasetError, HeadturnError, WorkerError
+from generator.pool import processes
 from generator.process import available_cores
 
 _FIRST = ("manifest", "heads and poses", "part files", "part hashes", "schema", "no nulls", "every row once")
@@ -221,9 +219,9 @@ def _findings(
         yield map(checker.quick if quick else checker.check, parts)
         return
     try:
-        with ProcessPoolExecutor(workers, get_context("spawn"), _open, (root,)) as pool:
-            yield pool.map(partial(_check, quick=quick), parts, chunksize=CHUNK)
-    except BrokenProcessPool as error:
+        with processes(workers, partial(_open, root)) as spread:
+            yield spread(partial(_check, quick=quick), parts, CHUNK)
+    except WorkerError as error:
         raise DatasetError(
             f"{root}: a process that was checking it was killed, perhaps for memory; nothing was changed. "
             "Run it again with --workers 1"

@@ -28,7 +28,7 @@ import polars as pl
 rows = pl.read_parquet("DIR/data/**/*.parquet")
 
 import duckdb
-rows = duckdb.sql("SELECT * FROM 'DIR/data/**/*.parquet'")
+rows = duckdb.sql("SELECT * FROM read_parquet('DIR/data/**/*.parquet', hive_partitioning=false)")
 
 from datasets import load_dataset
 rows = load_dataset("DIR")                               # heads: load_dataset("DIR", "heads")

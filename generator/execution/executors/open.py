@@ -41,6 +41,7 @@ def open_executor(
     worker_command(blender, 1)
     if blender is not None:
         check_blender(blender)
+        blender = os.path.abspath(blender) if os.path.dirname(blender) else blender
     if memory_mib is None:
         memory_mib = MEMORY_SHARE * _memory_mib() / (workers or len(available_cores()))
     options = LaneOptions(blender=blender, deadline_s=deadline_s, memory_mib=memory_mib)

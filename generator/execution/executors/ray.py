@@ -11,6 +11,7 @@ import socket
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from generator.errors import DatasetError, UsageError
@@ -20,9 +21,12 @@ from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.scratch import remove_leftovers, scratch_folder
 from generator.execution.lanes.slot import ATTEMPTS, LaneSlot, Outcome
+from generator.interpreter import guard_environment
 from generator.messages import BuildOrder, LaneOrder, from_json, to_json
 from generator.process import available_cores
 from generator.reading import parse_json
+
+_HOME = Path(__file__).resolve().parents[3]
 
 IN_FLIGHT = 2
 """Orders an actor has at a time: one to work on, one that waits at its door."""
@@ -84,6 +88,7 @@ class RayExecutor:
     def __init__(self, circumstances: Circumstances) -> None:
         workers, address = circumstances.workers, circumstances.address
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        guard_environment()
         if address is None:
             # Read when ray is imported: a Ray that cannot be joined listens on 127.0.0.1 alone.
             os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
@@ -94,13 +99,14 @@ class RayExecutor:
         self._ray = ray
         if address is None:
             self.workers = workers or len(available_cores())
-            ray.init(
-                num_cpus=self.workers,
-                object_store_memory=OBJECT_STORE_BYTES,
-                include_dashboard=False,
-                log_to_driver=False,
-                logging_level=logging.ERROR,
-            )
+            with _at_home():
+                ray.init(
+                    num_cpus=self.workers,
+                    object_store_memory=OBJECT_STORE_BYTES,
+                    include_dashboard=False,
+                    log_to_driver=False,
+                    logging_level=logging.ERROR,
+                )
             if ray.util.get_node_ip_address() != "127.0.0.1":
                 ray.shutdown()
                 raise UsageError(
@@ -110,7 +116,8 @@ class RayExecutor:
         else:
             try:
                 _answers(address)
-                ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+                with _at_home():
+                    ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
             except (OSError, ValueError, RuntimeError) as error:
                 raise UsageError(f"--address {address}: no Ray cluster answers ({error})") from error
             self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
@@ -175,6 +182,17 @@ def _answers(address: str) -> None:
     host, colon, port = address.rpartition(":")
     if colon and port.isdigit():
         socket.create_connection((host.removeprefix("ray://"), int(port)), ANSWER_S).close()
+
+
+@contextlib.contextmanager
+def _at_home() -> Iterator[None]:
+    """Ray has its workers look for modules where its driver is at this moment: where ours come from."""
+    before = Path.cwd()
+    os.chdir(_HOME)
+    try:
+        yield
+    finally:
+        os.chdir(before)
 
 
 @contextlib.contextmanager

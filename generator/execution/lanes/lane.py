@@ -2,7 +2,7 @@
 """A lane: one render worker and one detector that turn orders into committed parts.
 
 The same class serves every executor: in-process (serial), as a child process
-(``python -m generator.execution.lanes.lane_main``, local), or in a Ray actor. Images never leave
+(:mod:`generator.execution.lanes.lane_main`, local), or in a Ray actor. Images never leave
 the lane.
 """
 

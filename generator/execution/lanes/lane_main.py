@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A lane as a process of its own: ``python -m generator.execution.lanes.lane_main``."""
+"""A lane as a process of its own, started by :mod:`generator.execution.lanes.lane_process`."""
 
 from __future__ import annotations
 

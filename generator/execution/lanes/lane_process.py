@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from generator.codec import to_plain
 from generator.errors import WorkerError
 from generator.execution.lanes.lines import LineProcess
 from generator.execution.lanes.options import LaneOptions, OnImage
+from generator.interpreter import python_command
 from generator.messages import (
     LaneFailed,
     LaneOrder,
@@ -27,12 +27,12 @@ PATIENCE = 1.5
 
 
 class LaneProcess:
-    """Starts ``python -m generator.execution.lanes.lane_main`` and speaks with it."""
+    """Starts :mod:`generator.execution.lanes.lane_main` and speaks with it."""
 
     def __init__(self, options: LaneOptions) -> None:
         log = Path(options.scratch) / "lane.log"
         self._deadline_s = options.deadline_s * PATIENCE
-        self._process = LineProcess([sys.executable, "-m", "generator.execution.lanes.lane_main"], log)
+        self._process = LineProcess(python_command("generator.execution.lanes.lane_main"), log)
         self._process.send(to_plain(options))
         self._ready = False
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import subprocess
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from generator.errors import WorkerError
+from generator.interpreter import python_environment
 from generator.messages import from_json
 
 LOG_TAIL_LINES = 3
@@ -43,7 +43,7 @@ class LineProcess:
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=stream,
-                    env={**os.environ, **(env or {})},
+                    env={**python_environment(), **(env or {})},
                     text=True,
                     encoding="utf-8",
                     # Ctrl-C is for the host alone, which then ends its children in order.

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
@@ -17,6 +16,7 @@ from generator.errors import HeadError, UsageError
 from generator.execution.lanes.lines import LineProcess
 from generator.execution.lanes.options import DEADLINE_S
 from generator.execution.lanes.scratch import scratch_folder
+from generator.interpreter import python_command
 from generator.messages import (
     ConvertOrder,
     OrderDone,
@@ -52,7 +52,7 @@ def worker_command(blender: str | None, threads: int) -> list[str]:
             "bpy is not installed: pip install 'headturn[build]' with Python 3.11, "
             "or name a Blender with --blender"
         )
-    return [sys.executable, "-m", "generator.blender.worker", str(threads)]
+    return python_command("generator.blender.worker", str(threads))
 
 
 def check_blender(blender: str) -> None:
@@ -93,11 +93,10 @@ class Renderer:
     ) -> None:
         self.images = images
         self._deadline_s = deadline_s
-        path = os.pathsep.join([str(_PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-        # A Blender executable must not see our environment: its Python is another one.
-        env = {"PYTHONPATH": path} if blender is None else {"PYTHONPATH": ""}
-        # Nor another colour management, which studios set for all programs and Blender 5 for its children.
-        env["OCIO"] = ""
+        # Not another colour management, which studios set for all programs and Blender 5 for its children.
+        env = {"OCIO": ""}
+        if blender is not None:
+            env["PYTHONPATH"] = ""  # nor our modules: its Python is another one
         # Blender's own temporary folder goes with ours, also when the worker is killed.
         env |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(images))
         self._process = LineProcess(worker_command(blender, threads), log, env)
