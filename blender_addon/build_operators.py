@@ -12,6 +12,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from generator.errors import HeadturnError
 
 from . import building, session, settings, windows
+from .core.labels import one_line
 from .operators import source_is_named
 
 LEFT_OUT = 3
@@ -67,9 +68,9 @@ class BuildDataset(bpy.types.Operator):
         context.window_manager.event_timer_remove(self._timer)
         if build.exit_code is None:
             build.refused = True
-            self.report({"ERROR"}, session.state.error)
+            self.report({"ERROR"}, one_line(session.state.error))
         elif build.exit_code != 0 and not build.cancelled:
-            self.report({"WARNING" if build.exit_code == LEFT_OUT else "ERROR"}, build.headline())
+            self.report({"WARNING" if build.exit_code == LEFT_OUT else "ERROR"}, one_line(build.headline()))
         windows.redraw()
         return {"FINISHED"}
 
@@ -119,7 +120,7 @@ class LoadConfig(bpy.types.Operator, ImportHelper):
         try:
             settings.load(context.scene.headturn, Path(self.filepath))
         except HeadturnError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
         session.state.forget_heads()
         studio.look_changed(context.scene)
@@ -139,9 +140,9 @@ class SaveConfig(bpy.types.Operator, ExportHelper):
         try:
             settings.save(context.scene.headturn, Path(self.filepath))
         except HeadturnError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"headturn build {self.filepath}")
+        self.report({"INFO"}, one_line(f"headturn build {self.filepath}"))
         return {"FINISHED"}
 
 

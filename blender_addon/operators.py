@@ -14,6 +14,7 @@ import bpy
 from generator.errors import HeadturnError
 
 from . import pictures, session, settings, windows
+from .core.labels import one_line
 from .core.texts import FOLDER
 
 EXTREMES = "Headturn extremes"
@@ -158,7 +159,7 @@ class PreviewExtremes(bpy.types.Operator):
         try:
             poses = extremes(settings.poses(shown))
         except HeadturnError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
         landmarks.request_pictures(shown, poses, "rendering the extremes...", take, sheet=SHEET_COLUMNS)
         return {"FINISHED"}

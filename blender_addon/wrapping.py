@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
+from .core.labels import wrapped
 from .core.panel import Line
 
 WIDTH_PER_CHARACTER = 7.2
@@ -18,5 +17,5 @@ def message(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line, 
     scale = context.preferences.system.ui_scale
     characters = max(16, int(context.region.width / scale / WIDTH_PER_CHARACTER) - margin)
     column = layout.column(align=True)
-    for number, text in enumerate(textwrap.wrap(line.text, characters) or [""]):
+    for number, text in enumerate(wrapped(line.text, characters)):
         column.label(text=text, icon=line.icon if number == 0 else "BLANK1")

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from generator.escape import printable
+
 from .progress import EXIT_MEANING, Progress
 
 LOOK_EVERY_S = 2.0
@@ -126,10 +128,10 @@ class Build:
         self._last_line = log[-1].removeprefix("headturn: ") if log else "the host printed nothing"
         self._look_at_images()
         meaning = "stopped" if self.cancelled else self._meaning("ended")
-        self.report = f"{self.out}\n{meaning} (exit code {code}): {self._outcome()}\n\n"
+        self.report = f"{self.out}\n{meaning} (exit code {code}): {printable(self._outcome())}\n\n"
         for title, lines in (("Notes", self.progress.notes), ("Log", log)):
             if lines:
-                self.report += f"{title}\n" + "".join(f"  {line}\n" for line in lines) + "\n"
+                self.report += f"{title}\n" + "".join(f"  {printable(line)}\n" for line in lines) + "\n"
         self.close()
 
     def _look_at_images(self) -> None:

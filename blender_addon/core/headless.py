@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from generator.errors import HeadturnError
+from generator.escape import printable
 from generator.interpreter import python_environment
 
 from .host import check_host, find_host, host_command
@@ -36,7 +37,7 @@ def run(arguments: Sequence[str], *, preference: str = "", blender: str = "") ->
             return _build(command)
         return _pass_through(command)
     except HeadturnError as error:
-        print(f"headturn: {error}", file=sys.stderr, flush=True)
+        print(printable(f"headturn: {error}"), file=sys.stderr, flush=True)
         return error.exit_code
 
 
@@ -60,11 +61,11 @@ def _build(command: list[str]) -> int:
                 for event in process.poll():
                     progress.take(event)
                 while printed < len(progress.notes):
-                    print(progress.notes[printed], flush=True)
+                    print(printable(progress.notes[printed]), flush=True)
                     printed += 1
                 now = time.monotonic()
                 if progress.total and (progress.stage != last[0] or now - last[1] >= LINE_EVERY_S):
-                    print(progress.line(), flush=True)
+                    print(printable(progress.line()), flush=True)
                     last = (progress.stage, now)
                 time.sleep(0.05)
             except KeyboardInterrupt:
@@ -74,10 +75,10 @@ def _build(command: list[str]) -> int:
         process.close()
     if progress.result is not None:
         result = progress.result
-        print(f"{progress.line()} in {result['seconds']:.0f} s: {result['dataset']}")
-        print(f"digest {result['digest']}", flush=True)
+        print(printable(f"{progress.line()} in {result['seconds']:.0f} s: {result['dataset']}"))
+        print(printable(f"digest {result['digest']}"), flush=True)
     for line in process.log:
-        print(line, file=sys.stderr, flush=True)
+        print(printable(line), file=sys.stderr, flush=True)
     return _shell_code(code)
 
 

@@ -110,6 +110,7 @@ def check_host(host: Host) -> HostFacts:
 def host_command(host: Host, facts: HostFacts, arguments: list[str], blender: str) -> list[str]:
     """The command line of the host; a host without bpy renders with the Blender that asks."""
     renders = bool(arguments) and arguments[0] in ("build", "preview", "replay", "preview-server")
+    renders |= any(word.split("=")[0] == "--deep" for word in arguments)  # of verify
     if renders and facts.bpy is None and "--blender" not in arguments and blender:
         arguments = [*arguments, "--blender", blender]
     return [*host.command, *arguments]

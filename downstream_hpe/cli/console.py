@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from downstream_hpe.errors import HpeError
+from downstream_hpe.escape import printable
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output on stdout.")]
 
@@ -20,15 +21,20 @@ JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output 
 err = Console(stderr=True, emoji=False, markup=False)
 
 
-def note(text: str) -> None:
-    """One line on stderr, as it is."""
-    err.print(text, highlight=False, markup=False, soft_wrap=True)
+def note(text: str, style: str = "") -> None:
+    """One line on stderr, as it is; nothing in it is an order to the terminal."""
+    err.print(printable(text), style=style, highlight=False, markup=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """One line on stdout, as it is; nothing in it is an order to the terminal."""
+    typer.echo(printable(text))
 
 
 def progress() -> Progress:
     """A bar of a training, with its loss; nothing where stderr is no terminal."""
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[loss]}"),
@@ -45,7 +51,7 @@ def one_line_errors() -> Iterator[None]:
     try:
         yield
     except HpeError as error:
-        err.print(f"downstream-hpe: {error}", style="red", highlight=False, markup=False, soft_wrap=True)
+        note(f"downstream-hpe: {error}", style="red")
         sys.exit(error.exit_code)
     except ModuleNotFoundError as error:
         # The learning side is an extra of the distribution.

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from downstream_hpe.cli.console import JsonFlag
+from downstream_hpe.cli.console import JsonFlag, say
 from downstream_hpe.errors import UsageError
 
 
@@ -35,4 +35,4 @@ def export(
         typer.echo(json.dumps([{"file": str(path), "bytes": path.stat().st_size} for path in written]))
         return
     for path in written:
-        typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+        say(f"{path}: {path.stat().st_size / 1e6:.1f} MB")

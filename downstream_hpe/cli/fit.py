@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from downstream_hpe.cli.console import JsonFlag, note, progress
+from downstream_hpe.cli.console import JsonFlag, note, progress, say
 from downstream_hpe.errors import UsageError
 
 
@@ -110,7 +110,7 @@ def fit(
         return
     if fitted.evaluations:
         typer.echo(markdown(fitted.evaluations))
-    typer.echo(f"model     {model}")
+    say(f"model     {model}")
 
 
 def _missing(missing: MissingName, holes: HolesName | None) -> MissingName:

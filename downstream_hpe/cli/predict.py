@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from downstream_hpe.cli.console import JsonFlag, note
+from downstream_hpe.cli.console import JsonFlag, note, say
 from downstream_hpe.errors import DataError
 
 
@@ -65,7 +65,10 @@ def predict(
                     last = (row["input"], row["frame"])
                 if writer is not None:
                     writer.add(row)
-                typer.echo(json.dumps(row) if as_json else text(row, faces > 1))
+                if as_json:
+                    typer.echo(json.dumps(row))
+                else:
+                    say(text(row, faces > 1))
         except KeyboardInterrupt:
             stopped = True
     # From the first to the last, without the start of the detector.

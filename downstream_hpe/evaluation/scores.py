@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from downstream_hpe import escape
 from downstream_hpe.errors import DataError
 from downstream_hpe.geometry.metrics import axis_errors, euler_errors, geodesic_errors
 from downstream_hpe.geometry.rotation import ANGLES, angles_from_rotation, rotation_from_angles
@@ -132,10 +133,14 @@ def markdown(evaluations: Sequence[Evaluation]) -> str:
     ]
     for e in evaluations:
         cells = [*e.mae, e.mean_mae, e.maev, e.geodesic]
-        lines.append(f"| {e.name} | {e.count} | " + " | ".join(f"{value:.2f}" for value in cells) + " |")
+        lines.append(
+            f"| {escape.markdown(e.name)} | {e.count} | "
+            + " | ".join(f"{value:.2f}" for value in cells)
+            + " |"
+        )
     lines += [
         "",
-        "| angle | interval | rows | " + " | ".join(e.name for e in evaluations) + " |",
+        "| angle | interval | rows | " + " | ".join(escape.markdown(e.name) for e in evaluations) + " |",
         "| --- | --- | ---: | " + " | ".join("---:" for _ in evaluations) + " |",
     ]
     for same in zip(*(e.intervals for e in evaluations), strict=True):
@@ -153,11 +158,12 @@ def write_csv(evaluations: Sequence[Evaluation], path: Path) -> None:
             ["estimator", "angle", "low_deg", "high_deg", "rows", "mae_deg", "maev_deg", "geodesic_deg"]
         )
         for e in evaluations:
+            name = escape.csv_text(e.name)
             writer.writerow(
-                [e.name, "all", "", "", e.count, f"{e.mean_mae:.6f}", f"{e.maev:.6f}", f"{e.geodesic:.6f}"]
+                [name, "all", "", "", e.count, f"{e.mean_mae:.6f}", f"{e.maev:.6f}", f"{e.geodesic:.6f}"]
             )
             for angle, mae in zip(ANGLES, e.mae, strict=True):
-                writer.writerow([e.name, angle, "", "", e.count, f"{mae:.6f}", "", ""])
+                writer.writerow([name, angle, "", "", e.count, f"{mae:.6f}", "", ""])
             for i in e.intervals:
                 cells = [f"{i.mae:.6f}", "", f"{i.geodesic:.6f}"] if i.count else ["", "", ""]
-                writer.writerow([e.name, i.angle, f"{i.low:g}", f"{i.high:g}", i.count, *cells])
+                writer.writerow([name, i.angle, f"{i.low:g}", f"{i.high:g}", i.count, *cells])

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.escape import csv_text
 from downstream_hpe.geometry.rotation import ANGLES
 from downstream_hpe.prediction.face import Face
 
@@ -92,7 +93,7 @@ class RecordWriter:
     def add(self, row: Record) -> None:
         """One row, in the order of calls."""
         if self._stream is not None:
-            self._csv.writerow(row)
+            self._csv.writerow({**row, "input": csv_text(row["input"])})
             return
         self._rows.append(row)
         if len(self._rows) == ROWS_AT_ONCE:

@@ -18,6 +18,31 @@ ROTATION = "Rx(-pitch) Ry(yaw) Rz(roll)"
 ANGLE_COLUMNS = tuple(f"{angle}_deg" for angle in ANGLES)
 INDEX_COLUMNS = tuple(f"{angle}_index" for angle in ANGLES)
 HEAD_COLUMNS = ("subject", "expression")
+_TEXTS = {*HEAD_COLUMNS, "split", "projection"}
+_LISTS = {"rotation", "landmarks", "landmarks_exact", "camera", "translation_mm"}
+
+
+def check_columns(where: str, schema: pa.Schema, names: Sequence[str], otherwise: str) -> None:
+    """DataError if a column is not there, or not of its kind. otherwise: what is expected, or to be done."""
+    for name in names:
+        if name not in schema.names:
+            raise DataError(f"{where}: no column {name}; {otherwise}")
+        if schema.names.count(name) > 1:
+            raise DataError(f"{where}: two columns {name}; {otherwise}")
+        if not _is_of_its_kind(name, schema.field(name).type):
+            raise DataError(f"{where}: the column {name} holds {schema.field(name).type}; {otherwise}")
+
+
+def _is_of_its_kind(name: str, kind: pa.DataType) -> bool:
+    if name in _TEXTS:
+        kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+        return pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    if name in _LISTS:
+        lists = (pa.types.is_fixed_size_list, pa.types.is_list, pa.types.is_large_list)
+        return any(is_one(kind) for is_one in lists) and pa.types.is_floating(kind.value_type)
+    if name in INDEX_COLUMNS:
+        return pa.types.is_integer(kind)
+    return pa.types.is_boolean(kind) if name == "detected" else pa.types.is_floating(kind)
 
 
 def column(batch: pa.RecordBatch, name: str) -> np.ndarray:

@@ -14,7 +14,7 @@ from pyarrow import fs
 
 from downstream_hpe.errors import DataError
 from downstream_hpe.geometry.face_mesh import TOPOLOGY
-from downstream_hpe.tables.columns import ROTATION
+from downstream_hpe.tables.columns import ROTATION, check_columns
 
 SCHEMA_MAJOR = "1"
 BATCH_ROWS = 1024
@@ -49,11 +49,7 @@ def open_tables(path: Path | str, columns: Sequence[str]) -> Tables:
     first: tuple[str, dict[str, str]] | None = None
     for file in files:
         schema = file.physical_schema
-        missing = [name for name in columns if name not in schema.names]
-        if missing:
-            raise DataError(
-                f"{file.path}: no column {', '.join(missing)}; expected a table of headturn build"
-            )
+        check_columns(file.path, schema, columns, "expected a table of headturn build")
         facts = _facts(file.path, schema)
         if first is None:
             first = (file.path, facts)
@@ -79,7 +75,10 @@ def file_batches(
         columns=list(columns), filter=where, batch_size=BATCH_ROWS, batch_readahead=0, use_threads=False
     )
     try:
-        yield from (batch for batch in scanner.to_batches() if len(batch))
+        for batch in scanner.to_batches():
+            batch.validate(full=True)  # Parquet says that a text is UTF-8, and need not be right
+            if len(batch):
+                yield batch
     except (pa.ArrowException, OSError) as error:
         raise DataError(f"{file.path}: damaged; headturn verify says more of it") from error
 
@@ -100,14 +99,18 @@ def _open(path: Path) -> ds.ParquetFileFragment:
     fragment = ds.ParquetFileFormat().make_fragment(str(path), fs.LocalFileSystem())
     try:
         fragment.ensure_complete_metadata()
-    except (pa.ArrowInvalid, OSError) as error:
+        fragment.physical_schema.names  # noqa: B018 - which need not be text
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: not a readable Parquet file; expected one of headturn build") from error
     return fragment
 
 
 def _facts(path: str, schema: pa.Schema) -> dict[str, str]:
     """What all files must agree on, by its name in the metadata."""
-    metadata = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
+    try:
+        metadata = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: its metadata are no text; expected a table of headturn build") from error
     facts = {}
     for name in ("schema_version", "landmark_topology", "conventions"):
         if f"headturn.{name}" not in metadata:

@@ -23,6 +23,7 @@ from downstream_hpe.tables.columns import (
     HEAD_COLUMNS,
     INDEX_COLUMNS,
     cell_name,
+    check_columns,
     check_rows,
     column,
     landmarks_of,
@@ -169,9 +170,7 @@ def open_tensor(
 
 def _require_exact(found: Tables) -> None:
     for file in found.files:
-        for name in EXACT_COLUMNS:
-            if name not in file.physical_schema.names:
-                raise DataError(f"{file.path}: no column {name}; choose --missing keep or frontal")
+        check_columns(file.path, file.physical_schema, EXACT_COLUMNS, "choose --missing keep or frontal")
 
 
 def _cell(head: str, axes: tuple[np.ndarray, ...], place: np.ndarray) -> str:

@@ -15,7 +15,7 @@ import typer
 
 from generator import __version__
 from generator.cli import blender, build, export, heads, preview, replay, upgrade, verify
-from generator.cli.console import err, out
+from generator.cli.console import err, say
 from generator.errors import HeadturnError
 from generator.execution.stopping import Stopped
 
@@ -39,7 +39,7 @@ def make_app() -> typer.Typer:
 
 def _version(value: bool) -> None:
     if value:
-        out.print(f"headturn {__version__}", highlight=False)
+        say(f"headturn {__version__}")
         raise typer.Exit
 
 
@@ -59,10 +59,10 @@ def _one_line_errors() -> Iterator[None]:
     try:
         yield
     except HeadturnError as error:
-        err.print(f"headturn: {error}", style="red", highlight=False, markup=False, soft_wrap=True)
+        say(f"headturn: {error}", err, style="red")
         sys.exit(error.exit_code)
     except Stopped as stopped:
-        err.print(f"headturn: {stopped}; run the same command again to continue", soft_wrap=True)
+        say(f"headturn: {stopped}; run the same command again to continue", err)
         sys.exit(stopped.exit_code)
 
 

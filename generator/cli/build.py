@@ -13,10 +13,11 @@ from typing import Annotated, Any
 import typer
 
 from generator import registries
-from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, out, plural
+from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, plural, say
 from generator.cli.options import with_settings
 from generator.cli.reporter import JsonReporter, TerminalReporter
 from generator.errors import HeadturnError
+from generator.escape import printable
 from generator.execution.lanes.options import DEADLINE_S
 from generator.limits import MAX_WORKERS
 from generator.plan.config import BuildConfig, load_config
@@ -94,7 +95,7 @@ def run(
         if as_json or not sys.stdin.isatty():
             return False
         with reporter.paused():
-            return typer.confirm(f"{what}. Go on?", err=True)
+            return typer.confirm(printable(f"{what}. Go on?"), err=True)
 
     start = time.monotonic()
     command = portable_command(["headturn", *sys.argv[1:]])
@@ -131,7 +132,7 @@ def compact(
             json.dumps({"dataset": str(target), "parts": count, "rows": rows, "digest": manifest.digest})
         )
     else:
-        out.print(f"{target}: {count} parts, {rows} rows, the same digest", soft_wrap=True)
+        say(f"{target}: {count} parts, {rows} rows, the same digest")
 
 
 def register(app: typer.Typer) -> None:
@@ -171,4 +172,4 @@ def _print_result(result: Any, seconds: float, as_json: bool) -> None:
     if result.failed_units:
         lines.append(f"left out  {plural(result.failed_units, 'unit')}: see {result.root / 'failures.jsonl'}")
     for line in lines:
-        out.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)

@@ -10,7 +10,7 @@ from typing import Annotated, cast
 
 import typer
 
-from generator.cli.console import JsonFlag, err, out
+from generator.cli.console import JsonFlag, err, say
 from generator.cli.reporter import TerminalReporter
 from generator.registries import FORMATS
 
@@ -77,7 +77,7 @@ def export(
         lines.append(f"left out  {done.withheld} rows that may not be published")
     lines.append(f"read      {done.target / 'README.md'}")
     for line in lines:
-        out.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)
 
 
 def report(
@@ -98,7 +98,7 @@ def report(
     if as_json:
         typer.echo(json.dumps({"page": str(page), "bytes": size}))
     else:
-        out.print(f"{page} ({size / 1e6:.1f} MB)", highlight=False, markup=False, soft_wrap=True)
+        say(f"{page} ({size / 1e6:.1f} MB)")
 
 
 def register(app: typer.Typer) -> None:

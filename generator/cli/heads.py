@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out
+from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out, say, shown
 from generator.cli.reporter import TerminalReporter
 from generator.plan.settings import Heads
 
@@ -38,7 +38,7 @@ def heads_make(
             folder, count=count, seed=seed, expressions=expressions, progress=lambda _: reporter.advance()
         )
     command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
-    out.print(f"{len(made)} heads in {folder}; build with: {command}", highlight=False, soft_wrap=True)
+    say(f"{len(made)} heads in {folder}; build with: {command}")
 
 
 @heads_app.command("list", epilog="Example: headturn heads list /data/facescape")
@@ -66,13 +66,15 @@ def heads_list(
 
 
 def _print_heads(kind: str, path: Path, rows: list[dict[str, Any]]) -> None:
-    table = Table(title=f"{path}: {kind}, {len(rows)} heads", box=None, pad_edge=False, title_justify="left")
+    table = Table(
+        title=shown(f"{path}: {kind}, {len(rows)} heads"), box=None, pad_edge=False, title_justify="left"
+    )
     columns = [c for c in (rows[0] if rows else {}) if c not in ("source", "path", "skipped")]
     for column in columns:
         table.add_column(column)
     for row in rows:
         row = {**row, "texture": "x".join(map(str, row["texture"])) if row["texture"] else None}
-        table.add_row(*(_cell(row[c]) for c in columns), style="dim" if row["skipped"] else None)
+        table.add_row(*(shown(_cell(row[c])) for c in columns), style="dim" if row["skipped"] else None)
     out.print(table)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from generator.cli.console import BlenderOption, out
+from generator.cli.console import BlenderOption, say
 from generator.cli.options import numbers, with_settings
 from generator.errors import UsageError
 from generator.plan.config import load_config
@@ -46,7 +46,7 @@ def preview(
         draw_landmarks=landmarks,
         blender=blender,
     )
-    out.print(f"{picture}: {found}", highlight=False, soft_wrap=True)
+    say(f"{picture}: {found}")
 
 
 def previewed() -> list[Setting]:

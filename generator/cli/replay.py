@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from generator.cli.console import BlenderOption, JsonFlag
+from generator.cli.console import BlenderOption, JsonFlag, say
 
 
 def replay(
@@ -22,12 +22,18 @@ def replay(
 ) -> None:
     """Render one sample again from its head and configuration, and compare every value.
 
+    Image and passes are compared three ways: what is stored, its hash in the row, and the new one.
+
     Exit code 1 if anything differs.
     """
     from generator.execution.replay import replay_sample
 
     found = replay_sample(folder, sample_id, heads=heads, picture=picture, blender=blender)
-    typer.echo(json.dumps(found.as_dict(), indent=1) if as_json else found.text())
+    if as_json:
+        typer.echo(json.dumps(found.as_dict(), indent=1))
+    else:
+        for line in found.text().split("\n"):
+            say(line)
     if not found.same:
         raise typer.Exit(1)
 

@@ -26,6 +26,8 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from generator.cli.console import say
+
 
 class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
@@ -66,14 +68,14 @@ class TerminalReporter:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._progress = Progress(
-            TextColumn("{task.description:16}"),
+            TextColumn("{task.description:16}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             _Rate(),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
-            TextColumn("{task.fields[status]}", style="dim"),
+            TextColumn("{task.fields[status]}", style="dim", markup=False),
             console=console,
             disable=not console.is_terminal,
         )
@@ -90,7 +92,7 @@ class TerminalReporter:
     def stage(self, name: str, total: int) -> None:
         """A stage begins."""
         if not self._console.is_terminal:
-            self._console.print(f"{name}: {total}", highlight=False)
+            say(f"{name}: {total}", self._console)
         self._task = self._progress.add_task(name, total=total, status="")
 
     def advance(self, steps: int = 1) -> None:
@@ -100,7 +102,7 @@ class TerminalReporter:
 
     def note(self, text: str) -> None:
         """A line above the bar."""
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        say(text, self._console)
 
     def event(self, kind: str, facts: dict[str, Any]) -> None:
         """Show what the events add up to beside the bar."""

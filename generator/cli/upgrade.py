@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from generator.cli.console import JsonFlag, err, out
+from generator.cli.console import JsonFlag, err, say
 from generator.cli.reporter import TerminalReporter
 
 
@@ -37,15 +37,12 @@ def upgrade(
         facts = {"dataset": str(done.root), "changed": done.changed, "before": done.before}
         typer.echo(json.dumps({**facts, "schema_version": now, "digest": done.manifest.digest}))
     elif done.changed:
-        out.print(
+        say(
             f"{done.root}: schema {done.before} -> {now}, {done.manifest.rows} rows, "
-            f"digest {done.manifest.digest}",
-            highlight=False,
-            markup=False,
-            soft_wrap=True,
+            f"digest {done.manifest.digest}"
         )
     else:
-        out.print(f"{done.root}: of schema {now} already, nothing to do", highlight=False, soft_wrap=True)
+        say(f"{done.root}: of schema {now} already, nothing to do")
 
 
 def register(app: typer.Typer) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err
+from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, say
 from generator.cli.reporter import TerminalReporter
 from generator.errors import UsageError
 from generator.limits import MAX_WORKERS
@@ -46,10 +46,10 @@ def verify(
 ) -> None:
     """Prove that every row of the plan is there once, labels agree and hashes match.
 
-    Not proved: that the images show what was recorded, hashes included; --deep renders some or all of
-    them again, which takes the heads and the versions of the build. Nor that nobody recorded it all anew:
-    for that compare the Merkle root with the one of whoever made the dataset (--digest). The digest is a
-    checksum, which finds damage but no deceit.
+    Not proved: that images show what was recorded (--deep renders some or all of them again, which takes
+    the heads and the versions of the build), nor that nobody recorded it all anew, hashes included (give
+    --digest the Merkle root that the dataset's maker tells you; the digest is a checksum, which finds
+    damage but no deceit).
 
     Exit code 1 if anything is wrong, 3 if nothing is but --deep could not render all rows it chose.
     """
@@ -57,6 +57,8 @@ def verify(
 
     if quick and (digest, deep) != (None, None):
         raise UsageError("--digest and --deep need every row read; leave --quick out")
+    if deep is None and (seed, heads, blender) != (0, None, None):
+        raise UsageError("--seed, --heads and --blender are for --deep; give --deep N or --deep all")
     expected = None if digest is None else _hex(digest)
     count = None if deep is None else _count(deep)
     with TerminalReporter(err) as reporter:
@@ -81,7 +83,11 @@ def verify(
                 on_start=lambda total: reporter.stage("rendering again", total),
                 on_image=reporter.advance,
             )
-    typer.echo(json.dumps(report.as_dict(), indent=1) if as_json else report.text())
+    if as_json:
+        typer.echo(json.dumps(report.as_dict(), indent=1))
+    else:
+        for line in report.text().split("\n"):
+            say(line)
     if not report.ok:
         raise typer.Exit(1)
     if report.deep is not None and not report.deep.complete:

@@ -24,6 +24,7 @@ from generator.dataset.proof.compare import row_differences
 from generator.dataset.proof.context import known_config
 from generator.dataset.proof.stored import Stored, read_stored
 from generator.errors import HeadturnError, UsageError, WorkerError
+from generator.escape import printable
 from generator.execution.build.units import build_order
 from generator.execution.executors.executor import Executor
 from generator.execution.executors.open import open_executor
@@ -65,10 +66,12 @@ class Replay:
     not_rendered: HeadturnError | None = None
 
     def text(self) -> str:
-        """For people."""
+        """For people, a line a difference."""
         if self.same:
-            return f"{self.sample_id}: the same image, landmarks and labels, bit by bit\n{self.compared}"
-        return "\n".join([f"{self.sample_id}: not the same", *self.differences, *self.versions])
+            lines = [f"{self.sample_id}: the same image, landmarks and labels, bit by bit", self.compared]
+        else:
+            lines = [f"{self.sample_id}: not the same", *self.differences, *self.versions]
+        return "\n".join(map(printable, lines))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -10,6 +10,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
+from generator.escape import printable
+
 LOG_FILE = "build.log"
 
 
@@ -82,4 +84,4 @@ class LoggingReporter:
         assert self._file is not None, "use it in a with statement"
         # A full disk is told by whoever writes what matters.
         with self._lock, contextlib.suppress(OSError):
-            self._file.write(f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ} {text}\n")
+            self._file.write(f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ} {printable(text)}\n")

@@ -37,7 +37,11 @@ from generator.heads.paths import find_inside
 from generator.heads.textures import Textures, open_image
 
 # Anything in the JSON may be missing or of another kind than the standard says.
-_MALFORMED = (LookupError, TypeError, AttributeError, ValueError, AssertionError, RecursionError)
+# Of trimesh, too: where it has no value for a variable, that is a NameError.
+_MALFORMED = (
+    *(LookupError, TypeError, AttributeError, ValueError, AssertionError, RecursionError),
+    *(NameError, ArithmeticError, NotImplementedError, struct.error),
+)
 _UNTRANSFORMED = {"offset": [0, 0], "scale": [1, 1], "rotation": 0}
 
 

@@ -115,7 +115,8 @@ def _draw(poses: Poses, seed: Seed) -> PosePlan:
 def poses_csv(plans: PosePlans) -> str:
     """The text of poses.csv: the head where each has its own poses, the pose, and its chunk if it has one.
 
-    Every number is written so that it is read back bit by bit.
+    Every number is written so that it is read back bit by bit, and every name as it is: this file is for
+    programs, and a name holds no sign that a formula could do harm with.
     """
     heads: Iterable[HeadName | None] = [None] if plans.shared is not None else sorted(plans.by_head)
     names = [*(_HEAD if plans.shared is None else ()), *_COLUMNS, *([CHUNK] if plans.chunks else [])]

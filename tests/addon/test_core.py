@@ -64,6 +64,8 @@ def test_a_host_without_bpy_renders_with_the_blender_that_asks() -> None:
     given = ["build", "--blender", "/mine"]
     assert host.host_command(found, facts, given, "/b")[1:] == given
     assert host.host_command(found, facts, ["verify", "d"], "/b")[1:] == ["verify", "d"]
+    deep = ["verify", "d", "--deep=5"]
+    assert host.host_command(found, facts, deep, "/b")[1:] == [*deep, "--blender", "/b"]
 
 
 def test_progress_adds_up_events() -> None:

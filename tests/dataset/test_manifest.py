@@ -129,7 +129,7 @@ def test_card_states_licences_and_splits(dataset):
     text = (dataset / "README.md").read_text(encoding="utf-8")
     assert text.startswith("---\nlicense: cc0-1.0\n")
     assert 'path: "data/validation/*.parquet"' in text and "Do not publish" not in text
-    assert "| mesh | 2 | CC0-1.0 | yes | A. Person \\| 2020 |" in text
+    assert "| mesh | 2 | CC0-1.0 | yes | A. Person &#124; 2020 |" in text
 
 
 def test_card_warns_of_heads_that_must_not_be_published(dataset):

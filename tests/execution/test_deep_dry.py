@@ -166,3 +166,5 @@ def test_what_is_no_number_of_rows(made: DryBuild, value: str) -> None:
         ask(made.root, f"--deep={value}")
     with pytest.raises(UsageError, match="leave --quick out"):
         ask(made.root, "--deep", "1", "--quick")
+    with pytest.raises(UsageError, match="are for --deep"):
+        ask(made.root, "--heads", "elsewhere")

@@ -71,7 +71,7 @@ def write(source: Source, folder: Path) -> str:
     """Write the export and its description. Raises as :func:`...tables.write_tables` does."""
     rows = write_tables(source, folder)
     (folder / CARD_FILE).write_text(card(source, rows, "croissant"), encoding="utf-8")
-    text = json.dumps(description(source), indent=1, ensure_ascii=False)
+    text = json.dumps(description(source), indent=1)
     (folder / CROISSANT_FILE).write_text(text + "\n", encoding="utf-8")
     return ""
 
@@ -93,7 +93,7 @@ def description(source: Source) -> dict[str, Any]:
             f"{publishable} of the heads may be published under their licence. Columns, signs and frames: "
             "README.md."
         ),
-        "license": [_URLS.get(licence, licence) for licence in licences],
+        "license": [_URLS.get(licence) or _named(licence) for licence in licences],
         "version": source.manifest.versions["headturn"],
         "citeAs": "; ".join(attributions) or "see README.md",
         "identifier": source.manifest.digest,
@@ -119,6 +119,11 @@ def description(source: Source) -> dict[str, Any]:
             }
         ],
     }
+
+
+def _named(licence: str) -> str:
+    """A licence without an address that we know, so that no catalogue makes a link of it that is none."""
+    return licence if ":" not in licence or licence.startswith("https://") else f"see README.md ({licence})"
 
 
 def _field(field: pa.Field, meaning: str) -> dict[str, Any]:

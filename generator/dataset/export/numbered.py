@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from generator.dataset.format.heads_table import HeadRow
+from generator.escape import csv_text
 
 IDENTITIES_FILE = "identities.csv"
 
@@ -27,12 +28,14 @@ def head_numbers(heads: Sequence[HeadRow], keep_numbers: bool) -> dict[tuple[str
 
 
 def write_identities(heads: Sequence[HeadRow], numbers: Mapping[tuple[str, str], int], folder: Path) -> None:
-    """identities.csv: which head each number is, its split and licence. Raises OSError."""
+    """identities.csv: which head each number is, its split and licence. Raises OSError.
+
+    Before what a spreadsheet would take for a formula stands '.
+    """
     with (folder / IDENTITIES_FILE).open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("id", "subject", "expression", "split", "license", "redistributable"))
         for head in heads:
             number = numbers[head.subject, head.expression]
-            writer.writerow(
-                (number, head.subject, head.expression, head.split, head.license, head.redistributable)
-            )
+            texts = (head.subject, head.expression, head.split, head.license)
+            writer.writerow((number, *map(csv_text, texts), head.redistributable))

@@ -9,6 +9,7 @@ from generator.dataset.format.missing import Missing
 from generator.dataset.format.schema import conventions as conventions_of
 from generator.dataset.show.card import licences_text
 from generator.dataset.show.column_tables import markdown_table
+from generator.escape import markdown, markdown_code
 
 _MISSING: dict[Missing, str] = {
     "keep": "kept: their labels are exact all the same",
@@ -26,9 +27,9 @@ def facts(source: Source, name: str) -> str:
         ("rows", f"{source.rows} of {manifest.rows}"),
         ("heads", f"{len(source.heads)} of {manifest.heads}"),
         (f"rows without {'landmarks' if source.landmarks else 'a detection'}", _MISSING[source.missing]),
-        ("made from", f"content digest `{manifest.digest}`"),
-        ("rebuilt by", f"`{manifest.created_by}`"),
-        ("versions", ", ".join(f"{k} {v}" for k, v in sorted(manifest.versions.items()))),
+        ("made from", f"content digest {markdown_code(manifest.digest)}"),
+        ("rebuilt by", markdown_code(manifest.created_by)),
+        ("versions", ", ".join(markdown(f"{k} {v}") for k, v in sorted(manifest.versions.items()))),
     ]
     if source.left_out:
         rows.insert(2, ("rows left out", f"{source.left_out}, for lack of a detection or landmarks"))

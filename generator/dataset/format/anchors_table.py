@@ -93,6 +93,7 @@ def read_anchors(root: Path) -> dict[tuple[str, str], HeadAnchors]:
         return {name: no_head_anchors(*name) for name in heads}
     try:
         table = read_table(path)
+        table.validate(full=True)  # Parquet says that a text is UTF-8, and need not be right
     except (OSError, pa.ArrowException, ValueError) as error:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"
@@ -106,8 +107,8 @@ def read_anchors(root: Path) -> dict[tuple[str, str], HeadAnchors]:
     if not table.schema.equals(expected):
         raise DatasetError(f"{path}: not the columns of a table of anchors; run `headturn build` again")
     arrays = {
-        name: table.column(name).combine_chunks().flatten().to_numpy().reshape(len(table), count, -1)
-        for name in ("triangles", "weights", "points")
+        name: table.column(name).combine_chunks().flatten().to_numpy().reshape(len(table), count, values)
+        for name, values in (("triangles", 1), ("weights", 3), ("points", 3))
     }
     names = zip(table["subject"].to_pylist(), table["expression"].to_pylist(), strict=True)
     return {

@@ -222,6 +222,7 @@ def heads_version(root: Path) -> str:
 def _read(path: Path) -> pa.Table:
     try:
         table = read_table(path)
+        table.validate(full=True)  # Parquet says that a text is UTF-8, and need not be right
     except (OSError, pa.ArrowException, ValueError) as error:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"

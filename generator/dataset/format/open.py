@@ -62,7 +62,7 @@ def read_rows(
             for batch in data.to_batches(columns=stored or ["sample_id"], filter=where, **scan):
                 check_texts(batch, where_from)
                 yield with_defaults(batch, today, columns or today.names)
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, pa.ArrowException, KeyError) as error:
         # The whole message on one line: its first sentence does not name the file.
         what = " ".join(str(error).split())
         raise DatasetError(f"{root}: {what}; `headturn verify` says what is wrong") from error

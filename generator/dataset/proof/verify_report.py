@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from generator.dataset.show.detection import Cell
+from generator.escape import printable
 
 SHOWN = 3
 """How many of the same problem are named; the rest are counted."""
@@ -165,7 +166,7 @@ class VerifyReport:
             lines += [PROVED, *self._not_proved]
         if self.digest:
             lines.append(f"digest {self.digest}, " + self._root_text)
-        return "\n".join(lines)
+        return "\n".join(map(printable, lines))
 
     @property
     def _not_proved(self) -> list[str]:

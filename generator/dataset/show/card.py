@@ -15,6 +15,7 @@ from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import dataset_topology
 from generator.dataset.format.schema import conventions
 from generator.dataset.show.column_tables import column_rows, markdown_table
+from generator.escape import markdown, markdown_code
 from generator.landmarks.topology import FACE_MESH, Topology
 
 CARD_FILE = "README.md"
@@ -57,7 +58,8 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topolog
     }[manifest.images]
     summary = (
         f"{manifest.heads} heads, {manifest.rows} images, faces found in {rate} of them. "
-        f"Made with Headturn {manifest.versions['headturn']}; content digest `{manifest.digest}`."
+        f"Made with Headturn {markdown(manifest.versions['headturn'])}; "
+        f"content digest {markdown_code(manifest.digest)}."
     )
     other_tables = (
         "`heads.parquet` has a row a head: source, licence, file hashes, pivot, scale, camera, known "
@@ -102,7 +104,13 @@ def licences_text(heads: Sequence[HeadRow]) -> str:
     """Sources and licences of heads as a table in Markdown, and a warning where some may not be published."""
     counts = Counter((head.source, head.license, head.redistributable, head.attribution) for head in heads)
     rows = [
-        (source, str(count), license_, "yes" if redistributable else "**no**", attribution)
+        (
+            markdown(source),
+            str(count),
+            markdown(license_),
+            "yes" if redistributable else "**no**",
+            markdown(attribution),
+        )
         for (source, license_, redistributable, attribution), count in sorted(counts.items())
     ]
     text = markdown_table(("source", "heads", "licence", "images may be published", "attribution"), rows)

@@ -13,7 +13,7 @@ from generator.landmarks.topology import FACE_MESH, Topology
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
+    """A table in Markdown. Cells are Markdown; strangers' text in them comes through generator.escape."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -18,6 +17,7 @@ from generator.dataset.show.report.atlas import collect_atlas
 from generator.dataset.show.report.cells import PoseCells
 from generator.dataset.show.report.facts import build_facts, head_facts, why_no_atlas
 from generator.dataset.show.report.tiles import contact_sheet, thumbnails
+from generator.escape import html_json
 
 
 def write_report(root: Path, page: Path, progress: Callable[[int], None] | None = None) -> int:
@@ -64,10 +64,7 @@ def page_text(data: dict[str, Any]) -> str:
     template, style, script = (
         folder.joinpath(name).read_text(encoding="utf-8") for name in ("page.html", "page.css", "page.js")
     )
-    values = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    # Names of heads come from file names: "</script>" in one must not end the element.
-    values = values.replace("<", "\\u003c")
-    for mark, content in (("/*STYLE*/", style), ("/*SCRIPT*/", script), ("/*DATA*/", values)):
+    for mark, content in (("/*STYLE*/", style), ("/*SCRIPT*/", script), ("/*DATA*/", html_json(data))):
         head, _, tail = template.partition(mark)
         template = head + content + tail
     return template
