@@ -60,7 +60,7 @@ def test_every_export(dataset: Path, tmp_path: Path, form: str) -> None:
 
 def test_no_file_is_read_as_a_piece_of_a_partitioned_table() -> None:
     """pyarrow makes columns of such folders unless it is told not to, for single files as well."""
-    reads = re.compile(r"\bread_table\([^\n]*")
+    reads = re.compile(r"\bpq\.read_table\([^\n]*")
     for folder in ("generator", "downstream_hpe", "blender_addon", "benchmarks", "scripts"):
         for path in ROOT.glob(f"{folder}/**/*.py"):
             for call in reads.findall(path.read_text(encoding="utf-8")):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -86,7 +85,7 @@ def test_a_grey_picture_with_its_hash_fixed_everywhere(made: DryBuild) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"rubbish", "cannot be decoded"),
+        (b"rubbish", "is no PNG that can be decoded"),
         (grey((16, 17)), "has 16 x 17 pixels, its row says 16 x 16"),
     ],
 )
@@ -97,7 +96,7 @@ def test_what_is_no_image_of_its_row_even_where_nothing_can_be_rendered(
     again.refused = UsageError("bpy is not installed: pip install it")
     code, said = ask(made.root, "--deep", "all")
     assert code == 1
-    assert re.search(rf"FAIL  images again: {re.escape(NAME)}: \S*images/{re.escape(NAME)}.png {says}", said)
+    assert f"FAIL  images again: {NAME}: images/{NAME}.png {says}" in said
 
 
 def test_where_nothing_can_be_rendered_images_are_decoded_and_that_is_said(
@@ -166,5 +165,3 @@ def test_what_is_no_number_of_rows(made: DryBuild, value: str) -> None:
         ask(made.root, f"--deep={value}")
     with pytest.raises(UsageError, match="leave --quick out"):
         ask(made.root, "--deep", "1", "--quick")
-    with pytest.raises(UsageError, match="are for --deep"):
-        ask(made.root, "--heads", "elsewhere")

@@ -35,6 +35,8 @@ def check_texts(batch: pa.RecordBatch | pa.Table, where: object) -> None:
         if guard is None:
             continue
         column = batch.column(name)
+        if not pa.types.is_string(column.type):
+            raise DatasetError(f"{where}: {name} is {column.type}, no text")
         if guard == "path" and ROWS[name].default == "":
             column = pc.filter(column, pc.not_equal(column, ""))
         texts = pc.list_flatten(pc.split_pattern(column, "/")) if guard == "path" else column

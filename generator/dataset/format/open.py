@@ -122,18 +122,24 @@ def read_samples(root: Path, manifest: Manifest, sample_ids: Sequence[str]) -> d
 def image_bytes(root: Path, row: Mapping[str, Any]) -> bytes:
     """The encoded image of one row, from the table or from its file: a PNG or JPEG, by its header.
 
+    Raises DatasetError: as :func:`stored_bytes`, or it is no such image.
+    """
+    encoded, name = stored_bytes(root, row)
+    image_format(encoded, name)
+    return encoded
+
+
+def stored_bytes(root: Path, row: Mapping[str, Any]) -> tuple[bytes, str]:
+    """What is stored as the image of one row, whatever it is, and what messages call it.
+
     Raises DatasetError: the dataset was built without images, or the file is gone or lies elsewhere.
     """
     if row.get("image"):
-        encoded: bytes = row["image"]["bytes"]
-        image_format(encoded, f"{root}: an embedded image")
-        return encoded
+        return row["image"]["bytes"], f"{root}: an embedded image"
     if not row["image_path"]:
         raise DatasetError(f"{root}: built with images = none; build with files or embedded to see them")
     path = dataset_file(root, row["image_path"])
-    encoded = read_image(path)
-    image_format(encoded, str(path))
-    return encoded
+    return read_image(path), str(path)
 
 
 def proven_image(root: Path, row: Mapping[str, Any], sample_id: str) -> bytes:

@@ -17,7 +17,7 @@ import numpy as np
 from PIL import Image
 
 from generator.dataset.format.columns import ImageMode
-from generator.dataset.format.open import image_bytes
+from generator.dataset.format.open import stored_bytes
 from generator.dataset.format.passes import passes_sha256, read_channels
 from generator.dataset.proof.compare import StoredFile
 from generator.errors import DatasetError, UsageError
@@ -76,7 +76,7 @@ def read_stored(root: Path, row: Mapping[str, Any], images: ImageMode, wanted: D
     if images != "none":
         stored.image_name = row["image_path"] or f"the embedded image of {row['sample_id']}"
         try:
-            stored.image = image_bytes(root, row)
+            stored.image, _ = stored_bytes(root, row)
             decoded(stored.image, row, wanted.image_format)
             stored.decoded = True
         except DatasetError as error:
