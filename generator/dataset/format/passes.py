@@ -94,7 +94,7 @@ def read_channels(path: Path) -> dict[str, np.ndarray]:
     # Its library raises what it likes at a damaged file.
     except (RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError) as error:
         raise DatasetError(
-            f"{path}: not a readable OpenEXR ({one_line(error)}); run `headturn build` again"
+            f"{path}: not a readable OpenEXR; run `headturn build` again ({one_line(error)})"
         ) from error
 
 
