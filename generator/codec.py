@@ -75,6 +75,8 @@ def _from(kind: Any, value: Any) -> Any:
         return tuple(_from(inner, item) for inner, item in zip(arguments, value, strict=True))
     if origin is dict:
         return {key: _from(arguments[1], item) for key, item in value.items()}
+    if kind in (str, int, bool) and type(value) is not kind:
+        raise TypeError(f"expected {kind.__name__}, got {str(value)[:80]!r}")
     return kind(value) if kind in (Path, float) else value
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
@@ -168,3 +170,29 @@ main()
     assert done.returncode == 0, done.stderr
     done = subprocess.run([*python, "verify", "d"], cwd=tmp_path, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_one_interrupt_is_enough_while_it_starts(parametric_heads: Path, tmp_path: Path) -> None:
+    """numpy took it for a missing module, and others did without what they imported."""
+    program = "print('go', flush=True)\nfrom generator.cli import main\nmain()"
+    build = [sys.executable, "-c", program, "build", "--heads", str(parametric_heads), "--resolution", "64"]
+    for moment in range(10):
+        with subprocess.Popen(
+            [*build, "--out", str(tmp_path / str(moment))],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        ) as started:
+            assert started.stdout is not None
+            started.stdout.readline()
+            time.sleep(0.15 + 0.2 * moment)
+            started.send_signal(signal.SIGINT)
+            try:
+                _, said = started.communicate(timeout=30)
+            finally:
+                started.kill()
+        assert (started.returncode, "Traceback" in said) == (130, False), said
+        assert said.endswith("headturn: stopped by SIGINT; run the same command again to continue\n")

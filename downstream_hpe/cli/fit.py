@@ -67,14 +67,14 @@ def fit(
     normalisation: Annotated[
         NormalisationName, typer.Option(help="rms: the paper's. eyes: its published code's.")
     ] = NormalisationName.rms,
-    refinements: Annotated[int, typer.Option(min=0, help="Rounds of orthogonal iteration.")] = 2,
+    refinements: Annotated[int, typer.Option(min=0, max=1000, help="Rounds of orthogonal iteration.")] = 2,
     validation: Annotated[
         float, typer.Option(min=0, max=0.9, help="Share of subjects held out, if the dataset holds out none.")
     ] = 0.1,
     expression: Annotated[str | None, typer.Option(help="Only this expression in the tensor.")] = None,
-    epochs: Annotated[int | None, typer.Option(min=1, help="Training epochs.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights, order and noise.")] = 0,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of the training.")] = 2,
+    epochs: Annotated[int | None, typer.Option(min=1, max=10**6, help="Training epochs.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of weights, order and noise.")] = 0,
+    threads: Annotated[int, typer.Option(min=1, max=4096, help="Threads of the training.")] = 2,
     as_json: JsonFlag = False,
 ) -> None:
     """Decompose the tensor, fit the manifolds, train the networks, export, evaluate.
@@ -126,9 +126,13 @@ def _missing(missing: MissingName, holes: HolesName | None) -> MissingName:
     }[holes]
 
 
+def _is_rank(word: str) -> bool:
+    return word.isdecimal() and word.isascii() and len(word) <= 4 and int(word) > 0
+
+
 def _ranks(text: str) -> tuple[int, int, int, int]:
     words = text.split(",")
-    if len(words) != 4 or not all(word.strip().isdigit() and int(word) > 0 for word in words):
+    if len(words) != 4 or not all(_is_rank(word.strip()) for word in words):
         raise UsageError(f"--ranks {text!r}: expected four positive numbers, such as 5,3,3,3")
     identity, yaw, pitch, roll = map(int, words)
     if (yaw, pitch, roll) != (3, 3, 3):

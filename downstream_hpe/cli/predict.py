@@ -25,7 +25,9 @@ def predict(
         Path | None,
         typer.Option("--draw", help="Folder for copies with axes and angles; of one input a file, too."),
     ] = None,
-    faces: Annotated[int, typer.Option(min=1, help="At most so many faces a picture or frame.")] = 1,
+    faces: Annotated[
+        int, typer.Option(min=1, max=1000, help="At most so many faces a picture or frame.")
+    ] = 1,
     smooth: Annotated[bool, typer.Option(help="One-euro filter on video.")] = False,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop a video after so many frames.")] = None,
     as_json: JsonFlag = False,

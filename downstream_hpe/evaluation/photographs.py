@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.evaluation.archive import read_npz
+from downstream_hpe.evaluation.matlab import read_arrays
 from downstream_hpe.geometry.rotation import angles_from_rotation, rotation_from_angles
 from downstream_hpe.prediction.pictures import read_bgr
+from downstream_hpe.reading import MAX_TEXT_BYTES, read_limited
 from downstream_hpe.tables.rows import Rows
 
 LARGEST_DEG = 99.0
@@ -74,22 +75,16 @@ def aflw2000(folder: Path, left_out: LeftOut) -> Iterator[Photograph]:
 
 def _aflw2000_label(file: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """(yaw, pitch, roll) in degrees, and the middle of the face in pixels, None where it does not say."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    # scipy raises what it likes at a damaged file.
-    theirs = (MatReadError, OSError, LookupError, NameError, NotImplementedError, TypeError, ValueError)
     try:
-        with file.open("rb") as stream:
-            label = loadmat(stream, variable_names=["Pose_Para", "pt3d_68"])
-        pose = np.asarray(label["Pose_Para"], dtype=np.float64).ravel()
-        points = np.asarray(label.get("pt3d_68", np.empty((3, 0))), dtype=np.float64)
+        label = read_arrays(file, ("Pose_Para", "pt3d_68"))
+        pose = label["Pose_Para"].ravel()
+        points = label.get("pt3d_68", np.empty((3, 0)))
     except FileNotFoundError as error:
         raise DataError(f"{file}: there is no such label beside {file.stem}.jpg") from error
-    except (*theirs, zlib.error) as error:
+    except (OSError, KeyError, ValueError) as error:
         raise DataError(f"{file}: no Pose_Para can be read from it") from error
     if pose.size < 3 or not np.isfinite(pose[:3]).all():
-        raise DataError(f"{file}: Pose_Para is {pose.tolist()}, expected pitch, yaw, roll, ...")
+        raise DataError(f"{file}: Pose_Para is {pose[:7].tolist()}, expected pitch, yaw, roll, ...")
     pitch, yaw, roll = np.rad2deg(pose[:3])
     return np.array([yaw, pitch, roll]), points[:2].mean(axis=1) if points.shape == (3, 68) else None
 
@@ -151,11 +146,12 @@ def biwi_npz(file: Path, left_out: LeftOut) -> Iterator[Photograph]:
     DataError: not such a file, or angles in radians.
     """
     try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
-            images, poses = arrays["image"], np.asarray(arrays["pose"], dtype=np.float64)
-    # numpy raises what it likes at a damaged archive.
-    except (OSError, KeyError, ValueError, TypeError, AttributeError, EOFError, BadZipFile) as error:
-        raise DataError(f"{file}: expected an .npz with the arrays image and pose") from error
+        arrays = read_npz(file, ("image", "pose"))
+        images, poses = arrays["image"], np.asarray(arrays["pose"], dtype=np.float64)
+    except (OSError, ValueError, TypeError) as error:
+        raise DataError(
+            f"{file}: expected an .npz with the arrays image and pose ({_line(error)})"
+        ) from error
     if images.ndim != 4 or images.shape[3] != 3 or poses.shape != (len(images), 3):
         raise DataError(f"{file}: image {images.shape} and pose {poses.shape} do not belong together")
     if images.dtype != np.uint8 or not np.isfinite(poses).all():
@@ -219,7 +215,8 @@ def _at(faces: np.ndarray, centre: np.ndarray) -> np.ndarray:
 def _numbers(file: Path, count: int, what: str) -> np.ndarray:
     """The first numbers of a text file."""
     try:
-        numbers = np.array(file.read_text(encoding="ascii").split()[:count], dtype=np.float64)
+        text = read_limited(file, MAX_TEXT_BYTES).decode("ascii")
+        numbers = np.array(text.split()[:count], dtype=np.float64)
     except FileNotFoundError as error:
         raise DataError(f"{file}: there is no such file") from error
     except (OSError, ValueError) as error:
@@ -227,6 +224,11 @@ def _numbers(file: Path, count: int, what: str) -> np.ndarray:
     if len(numbers) < count or not np.isfinite(numbers).all():
         raise DataError(f"{file}: expected {count} numbers, {what}")
     return numbers
+
+
+def _line(error: Exception) -> str:
+    """What a system or a reader says of a file, on one line."""
+    return " ".join(str(getattr(error, "strerror", None) or error).split())
 
 
 def _labels(folder: Path, pattern: str, label: str, picture: str) -> list[Path]:

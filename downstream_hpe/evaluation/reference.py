@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.evaluation.archive import read_npz
 from downstream_hpe.geometry.face_mesh import CHIN, FOREHEAD, NOSE_TIP, POINTS
 from downstream_hpe.geometry.normalise import normalise
+from downstream_hpe.reading import MAX_TEXT_BYTES, read_limited
 from downstream_hpe.tables.rows import Rows
 
 
@@ -38,17 +40,18 @@ def load_reference(path: Path | str) -> np.ndarray:
     file = Path(path)
     try:
         if file.suffix == ".npz":
-            with np.load(file, allow_pickle=False) as arrays:
-                names = list(arrays)
-                if len(names) != 1:
-                    raise DataError(f"{file}: {len(names)} arrays, expected one of shape [{POINTS}, 3]")
-                points = np.asarray(arrays[names[0]], dtype=np.float64)
+            arrays = read_npz(file)
+            if len(arrays) != 1:
+                raise DataError(f"{file}: {len(arrays)} arrays, expected one of shape [{POINTS}, 3]")
+            points = np.asarray(next(iter(arrays.values())), dtype=np.float64)
         elif file.suffix == ".csv":
-            points = np.loadtxt(file, delimiter=",", dtype=np.float64)
+            text = read_limited(file, MAX_TEXT_BYTES).decode("utf-8")
+            points = np.loadtxt(text.splitlines(), delimiter=",", dtype=np.float64)
         else:
             raise DataError(f"{file}: expected a .npz or .csv file")
-    except (OSError, ValueError) as error:
-        raise DataError(f"{file}: not readable as a reference face ({str(error).splitlines()[0]})") from error
+    except (OSError, ValueError, TypeError) as error:
+        why = " ".join(str(error).split())[:200]
+        raise DataError(f"{file}: not readable as a reference face ({why})") from error
     if points.shape != (POINTS, 3) or not np.isfinite(points).all():
         raise DataError(f"{file}: expected {POINTS} finite points of x, y, z, got shape {points.shape}")
     down, front = points[CHIN, 1] > points[FOREHEAD, 1], points[NOSE_TIP, 2] < points[:, 2].mean()

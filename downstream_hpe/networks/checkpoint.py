@@ -16,10 +16,11 @@ from torch.optim.swa_utils import AveragedModel
 
 from downstream_hpe.errors import ModelError
 from downstream_hpe.manifold.tensor_model import TensorModel
-from downstream_hpe.model_file import packed, unpacked
+from downstream_hpe.model_file import MAX_BYTES, packed, unpacked
 from downstream_hpe.networks.pose_network import PoseNetwork
 from downstream_hpe.networks.recipe import Recipe
 from downstream_hpe.networks.samples import Samples
+from downstream_hpe.reading import check_regular
 
 CHECKPOINT = "checkpoint.safetensors"
 CHECKPOINT_FORMAT = "downstream-hpe checkpoint 2"
@@ -69,10 +70,11 @@ def resume(
     from safetensors import SafetensorError, safe_open
 
     try:
+        check_regular(path, MAX_BYTES)
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata()
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
-    except (OSError, SafetensorError) as error:
+    except (OSError, ValueError, SafetensorError) as error:
         raise ModelError(
             f"{path}: not a readable checkpoint ({str(error).splitlines()[0]}); delete it"
         ) from error
@@ -83,14 +85,18 @@ def resume(
         )
     parts: dict[str, dict[str, torch.Tensor]] = {"network": {}, "average": {}}
     state: dict[int, dict[str, Any]] = {}
-    for name, value in tensors.items():
-        part, _, key = name.partition(".")
-        if part == "adam":
-            index, _, moment = key.partition(".")
-            state.setdefault(int(index), {})[moment] = value
-        else:
-            parts[part][key] = value
-    network.load_state_dict(parts["network"])
-    average.load_state_dict(parts["average"])
-    optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
-    return int(facts["epochs"])
+    try:
+        epochs = int(facts["epochs"])
+        for name, value in tensors.items():
+            part, _, key = name.partition(".")
+            if part == "adam":
+                index, _, moment = key.partition(".")
+                state.setdefault(int(index), {})[moment] = value
+            else:
+                parts[part][key] = value
+        network.load_state_dict(parts["network"])
+        average.load_state_dict(parts["average"])
+        optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
+    except (KeyError, ValueError, TypeError, RuntimeError) as error:
+        raise ModelError(f"{path}: not the parts of a checkpoint; delete it") from error
+    return epochs

@@ -53,7 +53,7 @@ def find_sources(
         kind, _, number = given.partition(":")
         path = Path(given)
         if kind == "webcam":
-            if not number.isdigit():
+            if not (number.isdecimal() and number.isascii() and len(number) <= 4):
                 raise UsageError(f"{given}: expected a number, such as webcam:0")
             found.append(Source(int(number)))
             places.append(Path(f"webcam{number}.mp4"))

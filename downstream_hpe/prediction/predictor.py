@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from downstream_hpe.prediction import onnx_file
 from downstream_hpe.prediction.detector import FaceDetector
 from downstream_hpe.prediction.onnx_file import FORMAT, SHAPES
 from downstream_hpe.prediction.onnx_shapes import BATCH
+from downstream_hpe.reading import parse_json, read_limited
 
 MODEL_FILE = "model.onnx"
 DEFAULT_MODEL = "headturn"
@@ -72,26 +72,28 @@ class Predictor:
         """
         file = _file_of(model)
         try:
-            if file.stat().st_size > onnx_file.MAX_BYTES:
-                raise ModelError(
-                    f"{file}: larger than {onnx_file.MAX_BYTES / 1e6:.0f} MB; no model of this program"
-                )
-            content = file.read_bytes()
+            content = read_limited(file, onnx_file.MAX_BYTES)
+        except ValueError as error:
+            raise ModelError(
+                f"{file}: larger than {onnx_file.MAX_BYTES / 1e6:.0f} MB; no model of this program"
+            ) from error
         except OSError as error:
             raise ModelError(f"{file}: cannot be read ({error.strerror})") from error
         session = _open(file, content, threads)
-        text = session.get_modelmeta().custom_metadata_map.get("downstream-hpe", "{}")
         try:
-            facts = json.loads(text)
+            # What it calls a text need not be one.
+            text = session.get_modelmeta().custom_metadata_map.get("downstream-hpe", "{}")
+            values = [(v.name, v.type, v.shape[1:]) for v in (*session.get_inputs(), *session.get_outputs())]
+            facts = parse_json(text)
             ranges = np.array(facts["range_deg"], dtype=np.float64)
             subjects = frozenset(map(str, facts["trained_subjects"]))
-        except (KeyError, TypeError, ValueError, RecursionError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise ModelError(f"{file}: no downstream-hpe metadata; {EXPORT_AGAIN}") from error
         if facts.get("format") != FORMAT:
             raise ModelError(f"{file}: format {facts.get('format')!r}, expected {FORMAT!r}")
         if ranges.shape != (3, 2) or not (ranges[:, 0] < ranges[:, 1]).all():
             raise ModelError(f"{file}: its trained range is no range of three angles; {EXPORT_AGAIN}")
-        found = {v.name: (v.type, v.shape[1:]) for v in (*session.get_inputs(), *session.get_outputs())}
+        found = {name: (kind, shape) for name, kind, shape in values}
         for name, shape in SHAPES.items():
             optional = name == "confidence" and name not in found
             if not optional and found.get(name) != ("tensor(float)", shape):
@@ -176,7 +178,7 @@ def _file_of(model: Path | str) -> Path:
         return MODELS / f"{model}.onnx"
     folder = model_folder(model)
     file = Path(model) if folder is None else folder / MODEL_FILE
-    if not file.is_file():
+    if not file.exists():
         raise ModelError(
             f"{file}: no such model; expected a folder of downstream-hpe fit, an .onnx file, or one of the "
             f"models that come with this program: {', '.join(shipped_models()) or 'none'}"
@@ -196,7 +198,10 @@ def _open(file: Path, content: bytes, threads: int) -> Any:
     options.intra_op_num_threads = threads
     options.log_severity_level = 4
     try:
-        return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        # Without the fallback, which prints the error, names of the file's and all, and fails again.
+        return ort.InferenceSession(
+            content, options, providers=["CPUExecutionProvider"], enable_fallback=False
+        )
     except _faults() as error:
         # Its own text is long and speaks of its source files; the cause keeps it.
         reason = f"onnxruntime {ort.__version__} refuses it: {type(error).__name__}"
@@ -211,7 +216,7 @@ def _faults() -> tuple[type[Exception], ...]:
     from onnxruntime.capi import onnxruntime_pybind11_state as faults
 
     theirs = [e for e in vars(faults).values() if isinstance(e, type) and issubclass(e, Exception)]
-    return (*theirs, RuntimeError, MemoryError)
+    return (*theirs, RuntimeError, MemoryError, UnicodeDecodeError)
 
 
 def _pose(found: dict[str, np.ndarray]) -> Pose:

@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 
 from downstream_hpe.errors import INSTALL, DataError, ModelError
+from downstream_hpe.reading import check_regular
 
 SUFFIXES = {".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv"}
+MAX_BYTES = 1 << 40
+MAX_PIXELS = 1 << 26
+"""Of a frame: 8192 x 8192."""
+_FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegvideo,mpegts,asf,asf_o"
+"""FFmpeg's names for what these suffixes hold. Not among them: lists of other files, and of addresses."""
 FALLBACK_RATE = 30.0
 """Frames a second, where a camera or file does not say."""
 
@@ -30,11 +36,20 @@ class VideoReader:
 
     def __init__(self, source: Path | int) -> None:
         cv2 = _opencv()
-        self._capture = cv2.VideoCapture(source if isinstance(source, int) else str(source))
+        if isinstance(source, int):
+            self._capture = cv2.VideoCapture(source)
+        else:
+            _check_file(source)
+            # No other backend: one takes a name for a pattern, or for a program to run.
+            self._capture = cv2.VideoCapture(str(source), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             if isinstance(source, int):
                 raise DataError(f"webcam:{source}: there is no such webcam, or another program uses it")
             raise DataError(f"{source}: cannot be opened as video; it is cut off or none")
+        size = [int(self._capture.get(k)) for k in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
+        if size[0] * size[1] > MAX_PIXELS:
+            self._capture.release()
+            raise DataError(f"{source}: frames of {size[0]} x {size[1]} pixels; make them smaller")
         rate = self._capture.get(cv2.CAP_PROP_FPS)
         self.rate = rate if np.isfinite(rate) and rate > 0 else FALLBACK_RATE
         self.expected = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
@@ -100,9 +115,19 @@ class VideoWriter:
             self._writer.release()
 
 
+def _check_file(path: Path) -> None:
+    try:
+        check_regular(path, MAX_BYTES)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
 def _opencv() -> Any:
     # Its own lines would stand beside the one that says what went wrong.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"protocol_whitelist;file|format_whitelist;{_FORMATS}"
     try:
         import cv2
     except ImportError as error:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,9 @@ from pyarrow import fs
 
 from downstream_hpe.errors import DataError
 from downstream_hpe.geometry.face_mesh import TOPOLOGY
+from downstream_hpe.reading import check_regular, parse_json
 from downstream_hpe.tables.columns import ROTATION, check_columns
+from downstream_hpe.tables.parquet import MAX_FILE_BYTES, batch_rows
 
 SCHEMA_MAJOR = "1"
 BATCH_ROWS = 1024
@@ -68,11 +69,15 @@ def file_batches(
 
     Raises
     ------
-    DataError: the file is damaged.
+    DataError: the file is damaged, or would fill the memory.
     """
+    try:
+        rows = batch_rows(file.metadata, columns, BATCH_ROWS)
+    except ValueError as error:
+        raise DataError(f"{file.path}: {error}; headturn verify says more of it") from error
     # Without read-ahead one batch is in memory, not sixteen.
     scanner = file.scanner(
-        columns=list(columns), filter=where, batch_size=BATCH_ROWS, batch_readahead=0, use_threads=False
+        columns=list(columns), filter=where, batch_size=rows, batch_readahead=0, use_threads=False
     )
     try:
         for batch in scanner.to_batches():
@@ -96,11 +101,12 @@ def _parquet_files(where: Path) -> list[Path]:
 
 
 def _open(path: Path) -> ds.ParquetFileFragment:
-    fragment = ds.ParquetFileFormat().make_fragment(str(path), fs.LocalFileSystem())
     try:
+        check_regular(path, MAX_FILE_BYTES)
+        fragment = ds.ParquetFileFormat().make_fragment(str(path), fs.LocalFileSystem())
         fragment.ensure_complete_metadata()
         fragment.physical_schema.names  # noqa: B018 - which need not be text
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+    except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{path}: not a readable Parquet file; expected one of headturn build") from error
     return fragment
 
@@ -124,9 +130,9 @@ def _facts(path: str, schema: pa.Schema) -> dict[str, str]:
     if facts["landmark_topology"] != TOPOLOGY:
         raise DataError(f"{path}: landmark topology {facts['landmark_topology']}, expected {TOPOLOGY}")
     try:
-        rotation = json.loads(facts["conventions"])["rotation"]
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        rotation = parse_json(facts["conventions"])["rotation"]
+    except (ValueError, KeyError, TypeError) as error:
         raise DataError(f"{path}: headturn.conventions names no rotation") from error
-    if ROTATION not in rotation:
-        raise DataError(f"{path}: rotation convention {rotation!r}, expected {ROTATION}")
+    if not isinstance(rotation, str) or ROTATION not in rotation:
+        raise DataError(f"{path}: rotation convention {str(rotation)[:80]!r}, expected {ROTATION}")
     return facts

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.reading import MAX_STATE_BYTES, parse_json, read_limited
 
 MANIFEST = "manifest.json"
 
@@ -20,10 +20,10 @@ def pose_zero(dataset: Path | str) -> str | None:
     DataError: a manifest that is not one of headturn build.
     """
     file = Path(dataset) / MANIFEST
-    if not file.is_file():
+    if not file.exists():
         return None
     try:
-        frame = json.loads(file.read_text(encoding="utf-8"))["configuration"]["poses"]["frame"]
+        frame = parse_json(read_limited(file, MAX_STATE_BYTES))["configuration"]["poses"]["frame"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"{file}: not a readable manifest; headturn build writes it again") from error
     return str(frame)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ``headturn`` command: what people type, and what they see."""
 
+import sys
+
 
 def main() -> None:
     """Entry point of the console script and of ``python -m generator.cli``."""
@@ -8,6 +10,14 @@ def main() -> None:
     from generator.interpreter import forget_current_folder
 
     forget_current_folder()
-    from generator.cli.app import main
+    from generator.execution.stopping import Stopped, stoppable
 
-    main()
+    try:
+        with stoppable():
+            from generator.cli.app import main
+
+            main()
+    except Stopped as stopped:
+        # Without rich, whose import may be what was stopped.
+        print(f"headturn: {stopped}; run the same command again to continue", file=sys.stderr)
+        sys.exit(stopped.exit_code)

@@ -17,7 +17,6 @@ from generator import __version__
 from generator.cli import blender, build, export, heads, preview, replay, upgrade, verify
 from generator.cli.console import err, say
 from generator.errors import HeadturnError
-from generator.execution.stopping import Stopped
 
 COMMANDS = (build, verify, preview, export, replay, upgrade, heads, blender)
 """Modules whose ``register`` adds commands."""
@@ -61,9 +60,6 @@ def _one_line_errors() -> Iterator[None]:
     except HeadturnError as error:
         say(f"headturn: {error}", err, style="red")
         sys.exit(error.exit_code)
-    except Stopped as stopped:
-        say(f"headturn: {stopped}; run the same command again to continue", err)
-        sys.exit(stopped.exit_code)
 
 
 def main() -> None:

@@ -46,7 +46,11 @@ def build(
     ] = DEADLINE_S,
     memory: Annotated[
         float | None,
-        typer.Option(min=0, max=10**9, help="MiB a lane may grow to; default 80 % of the machine for all."),
+        typer.Option(
+            min=0,
+            max=10**9,
+            help="MiB a lane may grow to; default 80 % of the machine's, or its container's, for all.",
+        ),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Delete the dataset that is there first.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,

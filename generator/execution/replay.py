@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from generator.dataset.format.anchors_table import read_anchors
-from generator.dataset.format.files import write_bytes
+from generator.dataset.format.files import write_anywhere
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import read_manifest
 from generator.dataset.format.open import dataset_topology, image_bytes, read_samples
@@ -107,7 +107,7 @@ def replay_sample(
 
     def keep(_: str, image: bytes) -> None:
         if picture is not None:
-            write_bytes(picture, image)
+            write_anywhere(picture, image)
 
     found = [*replay_samples(root, [sample_id], heads=heads, blender=blender, workers=1, on_render=keep)]
     if found:

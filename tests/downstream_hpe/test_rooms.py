@@ -16,13 +16,14 @@ PACKAGE = Path(downstream_hpe.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # Each room, and each module at the top, may import itself and what stands in its row.
-COMMON = {"errors", "escape", "geometry"}
+COMMON = {"errors", "escape", "geometry", "reading"}
 LEARNED = {"prediction", "manifold", "tables", "model_file", *COMMON}
 MAY_IMPORT = {
     "errors": set(),
     "escape": set(),
     "geometry": set(),
-    "model_file": {"errors"},
+    "reading": set(),
+    "model_file": {"errors", "reading"},
     "tables": COMMON,
     "manifold": {"model_file", *COMMON},
     "prediction": COMMON,

@@ -17,6 +17,7 @@ from PIL import Image
 
 from generator.content import content_versions
 from generator.dataset.format.columns import ImageMode
+from generator.dataset.format.files import check_there
 from generator.dataset.format.part import commit_unit
 from generator.dataset.format.schema import part_schema
 from generator.dataset.format.unit_rows import UnitRows
@@ -120,6 +121,7 @@ class NoRenderer:
             image_suffix=f".{order.image_format}",
         )
         schema = part_schema(cast(ImageMode, order.images), self._versions(), order.configuration_digest)
+        check_there(Path(order.root))
         return Built(commit_unit(rows, schema, Path(order.root), order.unit), {}, self._versions())
 
 

@@ -10,6 +10,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +54,11 @@ def dataset_seeds() -> Iterator[tuple[str, bytes]]:
     import pyarrow.parquet as pq
     from small_dataset import HEADS, build_dataset
 
-    from generator.execution.build.receipts import Receipts
     from generator.heads.placement import Placement
     from generator.messages import HeadFacts, Placed, to_json
     from generator.plan.config import config_toml, load_config
     from generator.plan.poses import grid_plan
+    from generator.sealed import sealed_line
 
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "dataset"
@@ -81,12 +82,11 @@ def dataset_seeds() -> Iterator[tuple[str, bytes]]:
             yield name, RAW + small.getvalue()
         yield "poses", (root / "poses.csv").read_bytes()
         yield "poses", b"yaw,pitch,roll\n0,0,0\n10.5,-3,2\n"
-        known = Receipts(root)
-        known.add(built.parts[0])
-        yield "receipts", RAW + (root / "receipts.jsonl").read_bytes()
+        receipt = {"part": asdict(built.parts[0]), "stamp": [1, 2, "0" * 64]}
+        yield "receipts", RAW + sealed_line(receipt).encode() + b"\n"
     placement = Placement("cm", 10.0, "+Y", "+Z", (0.0, 1.0, 2.0), 100.0, 90.0)
     receipt = to_json(Placed(placement, (HeadFacts(10, 20, ("a note",)),)))
-    yield "placed", RAW + json.dumps({"key": "0" * 64, "receipt": receipt}).encode() + b"\n"
+    yield "placed", RAW + sealed_line({"key": "0" * 64, "receipt": receipt}).encode() + b"\n"
     yield "messages", RAW + json.dumps(receipt).encode()
     array = {"dtype": "<f8", "shape": [1, 3], "data": base64.b64encode(bytes(24)).decode()}
     yield "messages", RAW + json.dumps({"is": "Rendered", "frames": array}).encode()
@@ -209,7 +209,7 @@ def hpe_seeds() -> Iterator[tuple[str, bytes]]:
         "biwi",
         pose + b"--\n500 0 32\n0 500 32\n0 0 1\n\n0 0 0 0\n\n1 0 0\n0 1 0\n0 0 1\n\n0 0 0\n\n64 64\n",
     )
-    for kind in ("PNG", "JPEG", "GIF", "TIFF", "WEBP", "BMP"):
+    for kind in ("PNG", "JPEG", "TIFF", "WEBP", "BMP"):
         yield "picture", RAW + picture(kind)
     yield from model_seeds()
 

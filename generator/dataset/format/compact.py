@@ -108,4 +108,4 @@ def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> 
             raise DatasetError(f"{path}: what was read back differs from what was merged; check the disk")
         return replace(info, path=f"data/{split}/{path.name}")
 
-    return write_atomically(path, write, check)
+    return write_atomically(path, write, check, work)

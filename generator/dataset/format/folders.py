@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from generator.errors import DatasetError
+from generator.reading import check_regular
 
 
 @contextmanager
@@ -50,6 +52,7 @@ def share_files(source: Path, target: Path, without: Collection[str]) -> None:
         if path.is_dir():
             shutil.copytree(path, target / path.name, copy_function=_link_file)
         else:
+            check_regular(path, sys.maxsize)
             shutil.copy2(path, target / path.name)
 
 
@@ -66,6 +69,7 @@ def _check_plain(path: Path, root: Path) -> None:
 
 
 def _link_file(path: str, target: str) -> None:
+    check_regular(Path(path), sys.maxsize)  # a device has no end
     try:
         os.link(path, target)
     except OSError:

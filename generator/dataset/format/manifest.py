@@ -268,6 +268,8 @@ def _parse(values: dict[str, Any]) -> Manifest:
             as_name(name)
     if stored.images.mode not in IMAGE_MODES:
         raise ValueError(f"images: {stored.images.mode!r} is none of {', '.join(IMAGE_MODES)}")
+    if "headturn" not in stored.versions:
+        raise ValueError("versions name no headturn")
     return Manifest(
         versions=stored.versions,
         configuration=stored.configuration,

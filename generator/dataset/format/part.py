@@ -16,7 +16,13 @@ import pyarrow.parquet as pq
 
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
-from generator.dataset.format.files import file_sha256, one_line, write_atomically, write_files
+from generator.dataset.format.files import (
+    file_sha256,
+    make_folder,
+    one_line,
+    write_atomically,
+    write_files,
+)
 from generator.dataset.format.guard import check_texts
 from generator.dataset.format.parquet import iter_batches, open_parquet
 from generator.dataset.format.part_info import PartInfo
@@ -42,6 +48,11 @@ def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
     """
     check_name("split", split)
     check_name("unit", unit)
+    make_folder(root)
+    return _write_part(table, root, split, unit)
+
+
+def _write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
     path = root / "data" / split / f"part-{unit}.parquet"
 
     def check(temporary: Path) -> PartInfo:
@@ -50,7 +61,7 @@ def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
             raise DatasetError(f"{path}: what was read back differs from what was written; check the disk")
         return replace(info, path=f"data/{split}/{path.name}")
 
-    return write_atomically(path, lambda file: write_table(table, file), check)
+    return write_atomically(path, lambda file: write_table(table, file), check, root)
 
 
 def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> PartInfo:
@@ -58,14 +69,19 @@ def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> Par
 
     Raises DatasetError as :func:`write_part` does; then the part is not there.
     """
+    check_name("split", rows.split)
+    check_name("unit", unit)
     table = unit_table(rows, schema)
+    make_folder(root)
     if image_mode(schema) == "files":
         # The part that vouches for them comes last, so they need no rename of their own.
-        write_files({root / path: image for path, image in zip(rows.image_paths, rows.images, strict=True)})
+        write_files(
+            {root / path: image for path, image in zip(rows.image_paths, rows.images, strict=True)}, root
+        )
     if rows.passes is not None:
         files = zip(rows.passes_paths, rows.passes, strict=True)
-        write_files({root / path: content for path, (content, _) in files})
-    return write_part(table, root, rows.split, unit)
+        write_files({root / path: content for path, (content, _) in files}, root)
+    return _write_part(table, root, rows.split, unit)
 
 
 def iter_stored(path: Path) -> Iterator[pa.RecordBatch]:

@@ -127,7 +127,7 @@ def _rewrite(source: Path, work: Path, part: PartInfo, manifest: Manifest) -> Pa
             raise DatasetError(f"{work / part.path}: what was read back differs from what was written")
         return replace(info, path=part.path)
 
-    return write_atomically(work / part.path, write, check)
+    return write_atomically(work / part.path, write, check, work)
 
 
 def _fresh(root: Path) -> Path:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from generator.cgroup import worthwhile
 from generator.content import CONTENT, CONTENT_VERSION
 from generator.dataset.format.anchors_table import ANCHORS_SINCE, read_anchors
 from generator.dataset.format.columns import SCHEMA_VERSION
@@ -214,7 +215,7 @@ def _findings(
     """The findings of every part, in order, from as many processes as pay."""
     if workers is None:
         enough = 1 if quick else 1 + manifest.rows // ROWS_A_WORKER
-        workers = min(len(available_cores()), enough)
+        workers = min(worthwhile(available_cores()), enough)
     if workers < 2:
         yield map(checker.quick if quick else checker.check, parts)
         return

@@ -7,78 +7,120 @@ import contextlib
 import json
 import os
 import socket
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from generator.dataset.format.files import check_there
 from generator.errors import DatasetError
+from generator.locks import NoLocks, try_lock
+from generator.process import is_running
 from generator.reading import MAX_CONFIG_BYTES, parse_json, read_limited
 
 LOCK_FILE = ".lock"
 
-if sys.platform == "win32":
-    import msvcrt
 
-    def _try_lock(file: BinaryIO) -> None:
-        # Far beyond what is written, so that others can still read who holds it.
-        file.seek(2**30)
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        file.seek(0)
-else:
-    import fcntl
+class Lock:
+    """A folder that is held. note: what its file system lacks; "" if nothing."""
 
-    def _try_lock(file: BinaryIO) -> None:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    def __init__(self, root: Path, file: BinaryIO, note: str) -> None:
+        self._root, self._file, self.note = root, file, note
+        self._folder = root.stat()
+
+    def check(self) -> None:
+        """Raises DatasetError if the folder is no longer the one that is held."""
+        check_there(self._root)
+        # Either may change its number on file systems that make numbers up.
+        if not os.path.samestat(self._folder, self._root.stat()) and not self._is_there():
+            raise DatasetError(
+                f"{self._root}: this folder was replaced by another one while the build was at work; "
+                "nothing more is written there"
+            )
+
+    def free(self) -> None:
+        """Let others have the folder."""
+        with contextlib.suppress(OSError):  # Windows removes no open file; it does no harm there
+            if self._is_there():
+                (self._root / LOCK_FILE).unlink()
+        self._file.close()
+
+    def _is_there(self) -> bool:
+        try:
+            return os.path.samestat(os.fstat(self._file.fileno()), (self._root / LOCK_FILE).stat())
+        except FileNotFoundError:
+            return False
 
 
 @contextlib.contextmanager
-def locked(root: Path) -> Iterator[None]:
+def locked(root: Path) -> Iterator[Lock]:
     """Hold the folder root, which must exist, for this process alone.
 
-    A file left behind by a process that was killed is no hindrance: the lock is
-    the operating system's, the file only says who holds it.
+    A file left behind by a process that was killed is no hindrance: the lock is the operating system's, the
+    file only says who holds it. Where the file system has no locks, the file itself is the lock.
     Raises DatasetError if another process holds it, or root cannot be written.
     """
     path = root / LOCK_FILE
     try:
-        file = _open_locked(path)
-    except BlockingIOError as error:
-        raise DatasetError(_refusal(root, path)) from error
+        file, note = _open_locked(path)
     except OSError as error:
-        if sys.platform == "win32" and isinstance(error, PermissionError) and path.exists():
-            raise DatasetError(_refusal(root, path)) from error
         raise DatasetError(f"{root}: cannot write there ({error.strerror}); choose another --out") from error
-    with file:
-        holder = {"pid": os.getpid(), "host": socket.gethostname()}
+    lock = Lock(root, file, note)
+    try:
         file.truncate()
-        file.write(json.dumps(holder).encode())
+        file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode())
         file.flush()
-        try:
-            yield
-        finally:
-            with contextlib.suppress(OSError):  # Windows removes no open file; it does no harm there
-                path.unlink()
+        yield lock
+    finally:
+        lock.free()
 
 
-def _open_locked(path: Path) -> BinaryIO:
+def _open_locked(path: Path) -> tuple[BinaryIO, str]:
     while True:
-        file = path.open("r+b") if path.exists() else path.open("w+b")
         try:
-            _try_lock(file)
+            file, new = path.open("x+b"), True
+        except FileExistsError:
+            file, new = path.open("r+b"), False
+        try:
+            if not try_lock(file):
+                raise DatasetError(_refusal(path))
             # The holder before us may have removed the file between our opening and locking it.
             if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
+                return file, ""
+        except NoLocks as error:
+            if new:
+                why = f"{path.parent}: no locks there ({error.strerror})"
+                return file, f"{why}; the file {LOCK_FILE} takes their place"
+            file.close()
+            _remove_left(path)
         except BaseException:
             file.close()
             raise
         file.close()
 
 
-def _refusal(root: Path, path: Path) -> str:
+def _remove_left(path: Path) -> None:
+    """Remove the file of a process that has ended. DatasetError if it has not, or nobody here knows."""
+    holder = _holder(path)
+    pid = holder.get("pid")
+    if holder.get("host") != socket.gethostname() or not isinstance(pid, int):
+        raise DatasetError(
+            f"{_refusal(path)}. There are no locks, so nobody knows whether it still runs: "
+            f"if it does not, delete {path}"
+        )
+    if is_running(pid):
+        raise DatasetError(f"{_refusal(path)}. If that process is something else, delete {path}")
+    path.unlink(missing_ok=True)
+
+
+def _holder(path: Path) -> dict[str, object]:
     try:
         holder = parse_json(read_limited(path, MAX_CONFIG_BYTES))
-        who = f" (process {holder['pid']} on {holder['host']})"
-    except (OSError, ValueError, KeyError, TypeError):
-        who = ""
-    return f"{root}: another build{who} is at work there; wait for its end or choose another --out"
+    except (OSError, ValueError):
+        return {}
+    return holder if isinstance(holder, dict) else {}
+
+
+def _refusal(path: Path) -> str:
+    holder = _holder(path)
+    who = f" (process {holder['pid']} on {holder['host']})" if {"pid", "host"} <= set(holder) else ""
+    return f"{path.parent}: another build{who} is at work there; wait for its end or choose another --out"

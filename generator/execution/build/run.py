@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from generator import __version__, registries
 from generator.dataset.format.anchors_table import write_anchors
-from generator.dataset.format.files import write_bytes
+from generator.dataset.format.files import unsynced, write_bytes
 from generator.dataset.format.heads_table import write_heads
 from generator.dataset.format.manifest import (
     MANIFEST_FILE,
@@ -47,7 +47,7 @@ from generator.execution.build.folder import (
     write_poses,
 )
 from generator.execution.build.head_rows import head_anchors, head_row, relative
-from generator.execution.build.lock import locked
+from generator.execution.build.lock import Lock, locked
 from generator.execution.build.place import place_heads
 from generator.execution.build.placed_heads import lane_versions
 from generator.execution.build.receipts import Receipts, split_done
@@ -108,7 +108,7 @@ def build(
     root = root.absolute()
     shared_plan(config)  # what makes no sense is said before a folder is made
     claim(root)
-    with locked(root):
+    with locked(root) as lock:
         if fresh:
             start_over(root, confirm)
         config, continued = as_begun(config, root)
@@ -118,16 +118,31 @@ def build(
             logged.log(f"headturn {__version__}: {executor.name}, {executor.workers} workers; {command}")
             if continued:
                 logged.note("every head gets the same poses, as this dataset was begun")
-            return _build(config, root, executor, logged, command, confirm)
+            if lock.note:
+                logged.note(lock.note)
+            if reason := unsynced(root):
+                logged.note(f"{root}: a power cut may cost the newest files there ({reason}); run again then")
+            try:
+                return _build(config, root, executor, logged, command, confirm, lock)
+            except (DatasetError, OSError):
+                lock.check()  # a folder that is gone is the reason, whatever failed first
+                raise
 
 
 def _build(
-    config: BuildConfig, root: Path, executor: Executor, reporter: Reporter, command: str, confirm: Confirm
+    config: BuildConfig,
+    root: Path,
+    executor: Executor,
+    reporter: Reporter,
+    command: str,
+    confirm: Confirm,
+    lock: Lock,
 ) -> BuildResult:
     source = find_source(config, root, reporter)
     versions = lane_versions(executor, config.landmarks)
     recorded_versions = versions_of_parts(root)
     planned, skipped = place_heads(source, config, versions, root, executor, reporter)
+    lock.check()
     heads = [(head.head.subject, head.head.expression) for head in planned]
     earlier = read_pose_plans(root / POSES_FILE) if (root / POSES_FILE).exists() else None
     poses = chunk_poses(plan_poses(config, heads), config.dataset.unit_size, earlier)
@@ -156,7 +171,7 @@ def _build(
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")
 
     reporter.stage("rendering", sum(len(order.views) for order in todo))
-    parts, failures, seconds = run_units(todo, executor, receipts, reporter)
+    parts, failures, seconds = run_units(todo, executor, receipts, reporter, lock.check)
     write_lines(root / FAILURES_FILE, failures)
     recorded = config.moved_to(root)
     topology = registries.DETECTORS.get(config.landmarks.detector).topology
@@ -182,18 +197,27 @@ def _build(
         pictures.append(contact_sheet(root, manifest, root / SHEET_FILE))
         pictures.append(anchor_sheet(root, manifest, root / ANCHOR_SHEET_FILE))
     pictures.append(detection_map(root, manifest, root / MAP_FILE))
+    lock.check()
     write_manifest(manifest, root)
     return BuildResult(root, manifest, skipped, len(failures), pictures, seconds)
 
 
 def run_units(
-    orders: Sequence[BuildOrder], executor: Executor, receipts: Receipts, reporter: Reporter
+    orders: Sequence[BuildOrder],
+    executor: Executor,
+    receipts: Receipts,
+    reporter: Reporter,
+    check: Callable[[], None] = lambda: None,
 ) -> tuple[list[PartInfo], list[dict[str, Any]], dict[str, float]]:
-    """Carry out build orders. Returns (parts, failures, lane seconds a stage)."""
+    """Carry out build orders. Returns (parts, failures, lane seconds a stage).
+
+    check: is called after each; raises what ends the build.
+    """
     parts: list[PartInfo] = []
     failures: list[dict[str, Any]] = []
     seconds: dict[str, float] = defaultdict(float)
     for outcome in executor.run(orders, reporter.advance):
+        check()
         order = expect(BuildOrder, outcome.order)
         facts = {
             "unit": order.unit,

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
+from generator.cgroup import worthwhile
 from generator.execution.executors.executor import Circumstances, share_cores
 from generator.execution.executors.order_queue import OrderQueue
 from generator.execution.lanes.lane_process import LaneProcess
@@ -30,12 +31,14 @@ class LocalExecutor:
     name = "local"
 
     def __init__(self, given: Circumstances) -> None:
-        self.workers = given.workers or len(available_cores())
+        busy = worthwhile(available_cores())
+        self.workers = given.workers or busy
+        most = max(1, busy // self.workers)
         self._slots = []
         for k, cpus in enumerate(share_cores(self.workers)):
             folder = given.scratch / f"lane{k}"
             folder.mkdir()
-            own = replace(given.options, scratch=str(folder), threads=len(cpus), cpus=cpus)
+            own = replace(given.options, scratch=str(folder), threads=min(len(cpus), most), cpus=cpus)
             self._slots.append(LaneSlot(partial(LaneProcess, own)))
         # A lane ends with the thread that started it, so these threads live as long as the lanes.
         self._threads = ThreadPoolExecutor(self.workers)

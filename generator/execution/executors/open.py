@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from generator import registries
+from generator.cgroup import memory_bytes, worthwhile
 from generator.errors import UsageError
 from generator.execution.executors.executor import Circumstances, Executor
 from generator.execution.lanes.options import DEADLINE_S, LaneOptions
@@ -16,7 +18,7 @@ from generator.execution.lanes.scratch import scratch_folder
 from generator.process import MIB, available_cores
 
 MEMORY_SHARE = 0.8
-"""Of this machine's memory, for all lanes together, where no limit is given."""
+"""Of the memory of this machine or control group, for all lanes together, where no limit is given."""
 
 
 @contextmanager
@@ -43,7 +45,7 @@ def open_executor(
         check_blender(blender)
         blender = os.path.abspath(blender) if os.path.dirname(blender) else blender
     if memory_mib is None:
-        memory_mib = MEMORY_SHARE * _memory_mib() / (workers or len(available_cores()))
+        memory_mib = MEMORY_SHARE * _memory_mib() / (workers or worthwhile(available_cores()))
     options = LaneOptions(blender=blender, deadline_s=deadline_s, memory_mib=memory_mib)
     with scratch_folder() as scratch:
         executor: Executor = make(Circumstances(scratch, workers, address, options))
@@ -54,8 +56,6 @@ def open_executor(
 
 
 def _memory_mib() -> float:
-    """Memory of this machine; 0, for no limit, where it is not told."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / MIB
-    except (AttributeError, ValueError, OSError):
-        return 0.0
+    """Memory that there is for a build; 0, for no limit, where nothing says it."""
+    there = memory_bytes()
+    return 0.0 if math.isinf(there) else there / MIB

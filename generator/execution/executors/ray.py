@@ -14,6 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from generator.cgroup import worthwhile
 from generator.errors import DatasetError, UsageError
 from generator.execution.executors.executor import Circumstances
 from generator.execution.executors.order_queue import OrderQueue
@@ -98,7 +99,7 @@ class RayExecutor:
             raise UsageError("Ray is not installed: pip install 'headturn[cluster]'") from error
         self._ray = ray
         if address is None:
-            self.workers = workers or len(available_cores())
+            self.workers = workers or worthwhile(available_cores())
             with _at_home():
                 ray.init(
                     num_cpus=self.workers,

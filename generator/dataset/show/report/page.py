@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from generator.dataset.format.dataset_poses import read_dataset_poses
-from generator.dataset.format.files import write_bytes
+from generator.dataset.format.files import write_anywhere
 from generator.dataset.format.heads_table import read_heads
 from generator.dataset.format.manifest import read_manifest
 from generator.dataset.format.open import dataset_topology
@@ -31,7 +31,7 @@ def write_report(root: Path, page: Path, progress: Callable[[int], None] | None 
         or the page cannot be written.
     """
     text = page_text(report_data(Path(root), progress or (lambda _: None)))
-    write_bytes(Path(page), text.encode())
+    write_anywhere(Path(page), text.encode())
     return len(text.encode())
 
 
