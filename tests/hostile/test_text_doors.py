@@ -258,7 +258,7 @@ def test_everything_that_a_command_prints_goes_through_the_door() -> None:
     """Who adds a command finds this: JSON by typer.echo, all else by say or as shown."""
     for folder, own in (("generator", "console.py"), ("downstream_hpe", "console.py")):
         for module in (Path(__file__).parents[2] / folder / "cli").glob("*.py"):
-            if module.name == own:
+            if module.name in (own, "__init__.py"):  # which says that it was stopped, before rich is there
                 continue
             text = module.read_text(encoding="utf-8")
             assert not re.search(r"\b(err|out)\.print\((?!table\))|\bprint\(f", text), module
