@@ -19,5 +19,5 @@ def main() -> None:
             main()
     except Stopped as stopped:
         # Without rich, whose import may be what was stopped.
-        print(f"headturn: {stopped}; run the same command again to continue", file=sys.stderr)
+        sys.stderr.write(f"headturn: {stopped}; run the same command again to continue\n")
         sys.exit(stopped.exit_code)

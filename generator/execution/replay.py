@@ -218,6 +218,7 @@ class _Studio:
         indices = tuple((r["yaw_index"], r["pitch_index"], r["roll_index"]) for r in rows)
         views = plan_views(config, head.name, row.radius_mm, poses)
         root = self._scratch / unit
+        root.mkdir()
         order = build_order(head, _placement(row), points, row.split, views, indices, config, root)
         return replace(order, unit=unit, images="embedded")
 
