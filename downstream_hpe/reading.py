@@ -32,11 +32,14 @@ def check_regular(path: Path, limit: int) -> int:
 
 def read_limited(path: Path, limit: int) -> bytes:
     """The bytes of a regular file. Raises as :func:`check_regular` does."""
-    check_regular(path, limit)
+    size = check_regular(path, limit)
     # A file may be another by now: neither a pipe nor a device is waited for or read without end.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(handle, "rb") as file:
-        data = file.read(limit + 1)
+        # Not limit at once: room is made for as much as is asked for.
+        data = file.read(size + 1)
+        while len(data) <= limit and (more := file.read(1 << 20)):
+            data += more
     if len(data) > limit:
         raise ValueError(f"larger than {limit:,} bytes")
     return data

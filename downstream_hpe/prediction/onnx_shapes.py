@@ -17,7 +17,7 @@ BATCH = 1024
 """So many faces at once at most: a graph may hold the square of their number."""
 MAX_NUMBERS = 1 << 26
 """In all tensors that a graph makes of a batch; one of `downstream-hpe export` makes a fifth."""
-MAX_PRODUCTS = 1 << 37
+MAX_PRODUCTS = 1 << 36
 """Of all its matrices; of such a one, a hundredth."""
 MAX_NODES = 2000
 MAX_AXES = 8

@@ -18,7 +18,17 @@ FORMATS = ("JPEG", "PNG", "BMP", "WEBP", "TIFF")
 MAX_BYTES = 1 << 30
 MAX_PIXELS = 1 << 26
 """8192 x 8192; three times as many bytes, twice over, while it is turned upright."""
-_BROKEN = (OSError, SyntaxError, ValueError, EOFError, ArithmeticError, LookupError, TypeError, struct.error)
+_BROKEN = (
+    OSError,
+    SyntaxError,
+    ValueError,
+    EOFError,
+    ArithmeticError,
+    LookupError,
+    TypeError,
+    struct.error,
+    MemoryError,
+)
 
 
 def read_bgr(path: Path) -> np.ndarray:

@@ -18,8 +18,13 @@ SUFFIXES = {".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".
 MAX_BYTES = 1 << 40
 MAX_PIXELS = 1 << 26
 """Of a frame: 8192 x 8192."""
-_FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegvideo,mpegts,asf,asf_o"
-"""FFmpeg's names for what these suffixes hold. Not among them: lists of other files, and of addresses."""
+_BEGINNINGS = (
+    (4, b"ftyp"), (4, b"moov"), (4, b"mdat"), (4, b"free"), (4, b"skip"), (4, b"wide"), (4, b"pnot"),
+    (0, b"\x1a\x45\xdf\xa3"), (8, b"AVI "), (0, b"\x30\x26\xb2\x75"),
+    (0, b"\0\0\x01\xba"), (0, b"\0\0\x01\xb3"), (0, b"\x47"),
+)  # fmt: skip
+"""(place, bytes) of what these suffixes hold: QuickTime and MP4, Matroska, AVI, ASF, MPEG. FFmpeg goes by
+what it finds: elsewhere that may be a list of other files, or of addresses."""
 FALLBACK_RATE = 30.0
 """Frames a second, where a camera or file does not say."""
 
@@ -118,16 +123,19 @@ class VideoWriter:
 def _check_file(path: Path) -> None:
     try:
         check_regular(path, MAX_BYTES)
+        with path.open("rb") as file:
+            start = file.read(16)
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
     except ValueError as error:
         raise DataError(f"{path}: {error}") from error
+    if not any(start[place:].startswith(mark) for place, mark in _BEGINNINGS):
+        raise DataError(f"{path}: cannot be opened as video; it is cut off or none")
 
 
 def _opencv() -> Any:
     # Its own lines would stand beside the one that says what went wrong.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"protocol_whitelist;file|format_whitelist;{_FORMATS}"
     try:
         import cv2
     except ImportError as error:

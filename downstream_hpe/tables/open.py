@@ -124,11 +124,11 @@ def _facts(path: str, schema: pa.Schema) -> dict[str, str]:
         facts[name] = metadata[f"headturn.{name}"]
     if facts["schema_version"].split(".")[0] != SCHEMA_MAJOR:
         raise DataError(
-            f"{path}: schema version {facts['schema_version']}, expected {SCHEMA_MAJOR}.x; "
+            f"{path}: schema version {facts['schema_version'][:80]}, expected {SCHEMA_MAJOR}.x; "
             "use the version of Headturn that wrote it"
         )
     if facts["landmark_topology"] != TOPOLOGY:
-        raise DataError(f"{path}: landmark topology {facts['landmark_topology']}, expected {TOPOLOGY}")
+        raise DataError(f"{path}: landmark topology {facts['landmark_topology'][:80]}, expected {TOPOLOGY}")
     try:
         rotation = parse_json(facts["conventions"])["rotation"]
     except (ValueError, KeyError, TypeError) as error:

@@ -33,8 +33,19 @@ _SAMPLES = 200_000
 _JPEG_2000 = (b"\0\0\0\x0cjP  \r\n\x87\n", b"\xff\x4f\xff\x51")
 """How a file of it begins, and a stream without a file's frame."""
 
-_BROKEN = (OSError, SyntaxError, ValueError, EOFError, ArithmeticError, LookupError, struct.error)
-"""What Pillow raises at a damaged file; UnidentifiedImageError is an OSError."""
+_BROKEN = (
+    OSError,
+    SyntaxError,
+    ValueError,
+    EOFError,
+    ArithmeticError,
+    LookupError,
+    struct.error,
+    MemoryError,
+)
+"""What Pillow raises at a damaged file; UnidentifiedImageError is an OSError.
+
+A PNG of 62 bytes may say that it goes on for 4 GB, for which Pillow makes room: a MemoryError."""
 
 
 @contextlib.contextmanager

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import resource
 import sys
 import traceback
 import warnings
@@ -20,7 +19,6 @@ import atheris
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
-GIGABYTE = 1 << 30
 
 
 def main() -> None:
@@ -46,22 +44,13 @@ def main() -> None:
         except Exception as error:
             _note(error, data, Path(findings), name)
 
-    limit_memory()
+    targets.limit_memory()
     words = Path(findings) / f"{name}.dict"
     words.write_text("".join(f'"{_escaped(word)}"\n' for word in target.words), encoding="utf-8")
     if target.words:
         options.append(f"-dict={words}")
     atheris.Setup([sys.argv[0], *options], one_input)
     atheris.Fuzz()
-
-
-def limit_memory() -> None:
-    """A gigabyte more than there is now; beyond it there is a MemoryError, which nobody promised."""
-    used = next(
-        line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData")
-    )
-    limit = int(used.split()[1]) * 1024 + GIGABYTE
-    resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _note(error: Exception, data: bytes, folder: Path, name: str) -> None:

@@ -16,6 +16,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -124,7 +125,13 @@ def keep(target: Target, work: Path, limit: int) -> None:
 def _child(target: Target, findings: Path, options: list[str]) -> str:
     command = [sys.executable, str(HERE / "child.py"), target.name, str(findings), *options]
     env = {**os.environ, "MALLOC_ARENA_MAX": "2", "OMP_NUM_THREADS": "1", "ARROW_IO_THREADS": "1"}
-    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=env, check=False)
+    # libFuzzer ends a process without letting it tidy up.
+    memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="headturn-fuzz-", dir=memory) as scratch:
+        env["HEADTURN_FUZZ_SCRATCH"] = scratch
+        done = subprocess.run(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=env, check=False
+        )
     return done.stderr.decode(errors="replace")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import time
@@ -49,6 +50,26 @@ def test_a_reader_says_what_it_promises_of_every_input(target: Target) -> None:
             error.add_note(f"{target.name}: {name}")
             raise
         assert time.monotonic() - began < SLOWEST_S, name
+
+
+def test_no_input_takes_a_gigabyte() -> None:
+    """As the fuzzer has it: whoever asks for more gets a MemoryError."""
+    code = (
+        "import contextlib, warnings\n"
+        "import targets\n"
+        "warnings.simplefilter('ignore')\n"
+        "chosen = [one for one in targets.TARGETS.values() if not one.slow]\n"
+        "for one in chosen: one.run((one.corpus / 'sound-0').read_bytes())\n"
+        "targets.limit_memory()\n"
+        "for one in chosen:\n"
+        "    for file in sorted(one.corpus.iterdir()):\n"
+        "        with contextlib.suppress(*targets.promised()): one.run(file.read_bytes())\n"
+    )
+    paths = {"PYTHONPATH": os.pathsep.join([str(CORPUS.parent), str(ROOT)]), "MALLOC_ARENA_MAX": "2"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **paths}
+    )
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("target", inputs())

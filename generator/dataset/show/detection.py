@@ -13,6 +13,8 @@ from generator.dataset.format.dataset_poses import DatasetPoses, read_dataset_po
 from generator.dataset.format.heads_table import HeadRow, read_heads
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import as_array, read_rows
+from generator.errors import DatasetError
+from generator.limits import MAX_ROWS
 from generator.plan.poses import ANGLES
 
 BIN_DEG = 10
@@ -40,10 +42,15 @@ class DetectionTally:
 
     Two bytes a row and nothing else, so millions of rows fit.
     rows, detected: uint8 [heads, poses]; of a head with fewer poses the last are never counted.
+    Raises DatasetError: there would be more than MAX_ROWS of them.
     """
 
     def __init__(self, heads: Sequence[HeadRow], poses: DatasetPoses) -> None:
         self.heads, self.poses = heads, poses
+        if len(heads) * poses.most > MAX_ROWS:
+            raise DatasetError(
+                f"{len(heads):,} heads with up to {poses.most:,} poses are more than are counted"
+            )
         self.rows = np.zeros((len(heads), poses.most), np.uint8)
         self.detected = np.zeros((len(heads), poses.most), np.uint8)
 

@@ -26,7 +26,7 @@ class Fitted:
     @classmethod
     def of(cls, width: int, height: int, side: int) -> Fitted:
         """The place of an image of width x height pixels."""
-        longest = max(width, height)
+        longest = max(width, height, 1)
         wide, high = (max(1, round(size * side / longest)) for size in (width, height))
         return cls(side, longest, (side - wide) // 2, (side - high) // 2, wide, high)
 
