@@ -48,6 +48,7 @@ class Manifest:
         between two builds of the same configuration.
     tables: SHA-256 of the files of :func:`side_tables`; :func:`write_manifest` fills it in.
     files: SHA-256 of config.toml and failures.jsonl, where they are there; filled in likewise.
+        None in a manifest of the first release, which covered none.
     others: values of a later schema that we do not know, kept as they are.
     """
 
@@ -60,7 +61,7 @@ class Manifest:
     failures: int = 0
     created_by: str = ""
     tables: dict[str, str] = field(default_factory=dict)
-    files: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] | None = None
     schema_version: str = SCHEMA_VERSION
     others: dict[str, Any] = field(default_factory=dict)
 
@@ -101,7 +102,7 @@ class Manifest:
             "tables": self.tables,
             "parts": [asdict(part) for part in sorted(self.parts, key=lambda part: part.path)],
             "created_by": self.created_by,
-            **({"files": self.files} if self.files else {}),
+            **({} if self.files is None else {"files": self.files}),
             **self.others,
         }
 
@@ -242,7 +243,7 @@ class _Stored(BaseModel):
     tables: dict[str, str]
     parts: Annotated[list[_Part], Field(min_length=1)]
     created_by: str
-    files: dict[str, str] = {}
+    files: dict[str, str] | None = None
     sha256: str = ""
 
 

@@ -19,6 +19,7 @@ from generator.errors import DatasetError, UsageError
 from generator.escape import quoted
 from generator.landmarks.topology import FACE_MESH, Topology
 from generator.names import name_problem
+from generator.reading import parse_json
 from generator.registries import TOPOLOGIES
 
 
@@ -102,9 +103,12 @@ def schema_version_of(schema: pa.Schema) -> str:
 
 
 def versions_of(schema: pa.Schema) -> dict[str, str]:
-    """Versions of everything that decided the content of a part, from its metadata."""
-    versions: dict[str, str] = json.loads((schema.metadata or {}).get(b"headturn.versions", b"{}"))
-    return versions
+    """Versions of everything that decided the content of a part, from its metadata; none if it has none."""
+    try:
+        versions = parse_json((schema.metadata or {}).get(b"headturn.versions", b"{}"))
+    except ValueError:
+        return {}
+    return {str(k): str(v) for k, v in versions.items()} if isinstance(versions, dict) else {}
 
 
 def check_schema_version(version: str, where: str) -> None:

@@ -169,7 +169,7 @@ def verify_dataset(
 
 def _changed_files(root: Path, manifest: Manifest) -> Iterator[str]:
     """The small files beside the tables that are not those of the build."""
-    if not manifest.files:  # written before they were covered
+    if manifest.files is None:  # written before they were covered
         return
     try:
         now = covered_files(root)
