@@ -28,7 +28,7 @@ class HeadturnPreferences(bpy.types.AddonPreferences):
         name="Python with Headturn",
         description=(
             "A Python, or the folder of its environment, in which Headturn is installed. Empty: "
-            "HEADTURN_PYTHON, then a .venv beside the configuration, then headturn on PATH"
+            "HEADTURN_PYTHON, then headturn on PATH"
         ),
         subtype="FILE_PATH",
         update=_python_changed,

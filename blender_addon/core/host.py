@@ -58,10 +58,10 @@ class HostFacts:
 
 
 def find_host(preference: str, beside: Path | None, environ: Mapping[str, str] = os.environ) -> Host:
-    """The host, in this order: the preference, HEADTURN_PYTHON, a .venv beside the configuration, PATH.
+    """The host, in this order: the preference, HEADTURN_PYTHON, PATH.
 
     preference: a Python, or the folder of its environment; empty if not set.
-    beside: the configuration's folder.
+    beside: the configuration's folder. A .venv there is named and not run: the folder may be from anybody.
     Raises HostMissing if there is none, or if one that was named does not exist:
     what somebody asked for is never silently replaced.
     """
@@ -71,17 +71,17 @@ def find_host(preference: str, beside: Path | None, environ: Mapping[str, str] =
             if python is None:
                 raise HostMissing(f"{found_by}: {text} is no Python and no environment that has one")
             return _host(python, found_by)
-    if beside is not None and (python := _python(beside / ".venv")) is not None:
-        return _host(python, f"{beside / '.venv'}")
     # Full paths alone: others lead to the folder one happens to be in, which is anybody's.
     folders = filter(os.path.isabs, environ.get("PATH", "").split(os.pathsep))
     found = shutil.which("headturn", path=os.pathsep.join(folders))
     if found is not None and os.path.isabs(found):
         return Host((found,), "PATH")
-    raise HostMissing(
-        f"no Python with Headturn was found: run  {INSTALL}  and name that folder in the add-on's "
-        f"preferences or in {VARIABLE}"
-    )
+    name = f"in the add-on's preferences or in {VARIABLE}"
+    if beside is not None and _python(beside / ".venv") is not None:
+        raise HostMissing(
+            f"no Python with Headturn was named: if {beside / '.venv'} is yours, name it {name}"
+        )
+    raise HostMissing(f"no Python with Headturn was found: run  {INSTALL}  and name that folder {name}")
 
 
 def check_host(host: Host) -> HostFacts:

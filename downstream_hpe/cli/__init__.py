@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The ``downstream-hpe`` command: what people type, and what they see."""
 
+import sys
+
 
 def main() -> None:
     """Entry point of the console script and of ``python -m downstream_hpe.cli``."""
@@ -8,6 +10,10 @@ def main() -> None:
     from downstream_hpe.cli.current_folder import forget_current_folder
 
     forget_current_folder()
+    for stream in (sys.stdout, sys.stderr):
+        # A path may hold what this terminal, or any, cannot show.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     from downstream_hpe.cli.app import main
 
     main()

@@ -15,6 +15,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from downstream_hpe.errors import HpeError
 from downstream_hpe.escape import printable
 
+EXTRAS = {
+    **dict.fromkeys(("torch", "onnx", "safetensors"), "hpe"),
+    **dict.fromkeys(("onnxruntime", "mediapipe", "cv2"), "pose"),
+}
+"""The extra that brings a module along."""
+
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output on stdout.")]
 
 # Without emoji, which rich would make of what stands between colons, as in webcam:-1: expected ...
@@ -53,11 +59,18 @@ def one_line_errors() -> Iterator[None]:
     except HpeError as error:
         note(f"downstream-hpe: {error}", style="red")
         sys.exit(error.exit_code)
-    except ModuleNotFoundError as error:
-        # The learning side is an extra of the distribution.
-        if error.name not in ("torch", "onnx", "onnxruntime", "safetensors"):
+    except ImportError as error:
+        # What comes with an extra is missing, or a library of the system that it needs.
+        name = (error.name or "").partition(".")[0]
+        if name not in EXTRAS:
             raise
-        note(f"downstream-hpe: {error.name} is not installed: pip install 'headturn[hpe]'")
+        missing = isinstance(error, ModuleNotFoundError)
+        what = f"{name} is not installed" if missing else f"{name} cannot be imported ({error})"
+        note(f"downstream-hpe: {what}: pip install 'headturn[{EXTRAS[name]}]'")
+        sys.exit(1)
+    except UnicodeEncodeError as error:
+        name = repr(error.object if len(error.object) < 300 else f"{error.object[:300]}...")
+        note(f"downstream-hpe: {name} holds bytes that are no text in UTF-8; rename it")
         sys.exit(1)
     except OSError as error:
         note(f"downstream-hpe: {error}")

@@ -12,6 +12,10 @@ def main() -> None:
     forget_current_folder()
     from generator.execution.stopping import Stopped, stoppable
 
+    for stream in (sys.stdout, sys.stderr):
+        # A path may hold what this terminal, or any, cannot show.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
         with stoppable():
             from generator.cli.app import main

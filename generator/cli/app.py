@@ -21,6 +21,12 @@ from generator.errors import HeadturnError
 COMMANDS = (build, verify, preview, export, replay, upgrade, heads, blender)
 """Modules whose ``register`` adds commands."""
 
+EXTRAS = {
+    **dict.fromkeys(("bpy", "cv2", "embreex", "mediapipe", "OpenEXR", "trimesh"), "build"),
+    "ray": "cluster",
+}
+"""The extra that brings a module along."""
+
 
 def make_app() -> typer.Typer:
     """The command with all its options, as the table of settings and the registries are now."""
@@ -60,6 +66,19 @@ def _one_line_errors() -> Iterator[None]:
     except HeadturnError as error:
         say(f"headturn: {error}", err, style="red")
         sys.exit(error.exit_code)
+    except UnicodeEncodeError as error:
+        name = repr(error.object if len(error.object) < 300 else f"{error.object[:300]}...")
+        say(f"headturn: {name} holds bytes that are no text in UTF-8; rename it", err, style="red")
+        sys.exit(1)
+    except ImportError as error:
+        # What comes with an extra is missing, or a library of the system that it needs.
+        name = (error.name or "").partition(".")[0]
+        if name not in EXTRAS:
+            raise
+        missing = isinstance(error, ModuleNotFoundError)
+        what = f"{name} is not installed" if missing else f"{name} cannot be imported ({error})"
+        say(f"headturn: {what}: pip install 'headturn[{EXTRAS[name]}]'", err, style="red")
+        sys.exit(1)
 
 
 def main() -> None:

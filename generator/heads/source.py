@@ -50,7 +50,7 @@ def find_heads(
     if not path.exists():
         raise UsageError(f"no such file or folder: {path}")
     if not is_text(str(path)):
-        raise UsageError(f"{path}: the path holds bytes that are no text; rename that folder")
+        raise UsageError(f"{path}: the path holds bytes that are no text in UTF-8; rename it")
     if units is not None and units not in MM_PER_UNIT:
         raise UsageError(f"unknown unit {units!r}; one of {', '.join(MM_PER_UNIT)}")
     for text, option in ((up, "--up"), (forward, "--forward")):
@@ -104,7 +104,7 @@ def _recordable(heads: list[Head], skipped: list[SkippedHead]) -> tuple[list[Hea
 def _no_text(head: Head) -> str:
     for text in (head.license, head.attribution, *map(str, head.files)):
         if not is_text(text):
-            return f"{quoted(Path(text).name)} holds bytes that are no text; rename it or write it in UTF-8"
+            return f"{quoted(Path(text).name)} holds bytes that are no text in UTF-8; rename it"
     return ""
 
 

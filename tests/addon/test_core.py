@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import sys
 import time
 import zipfile
@@ -26,7 +27,7 @@ def make_python(folder: Path) -> Path:
     return path
 
 
-def test_the_host_is_looked_up_in_the_written_order(tmp_path: Path) -> None:
+def test_the_host_is_looked_up_in_the_written_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     preferred, named, beside = (make_python(tmp_path / name) for name in ("a", "b", "c/.venv"))
     on_path = tmp_path / "d" / "headturn"
     on_path.parent.mkdir()
@@ -37,8 +38,13 @@ def test_the_host_is_looked_up_in_the_written_order(tmp_path: Path) -> None:
     assert host.find_host(str(tmp_path / "a"), tmp_path / "c", environ).command[0] == str(preferred)
     assert host.find_host("", tmp_path / "c", environ).command[0] == str(named)
     del environ["HEADTURN_PYTHON"]
-    assert host.find_host("", tmp_path / "c", environ).command[0] == str(beside)
-    assert host.find_host("", tmp_path, environ).command == (str(on_path),)
+    assert host.find_host("", tmp_path / "c", environ).command == (str(on_path),)
+    # What lies beside somebody's files is not run, and PATH counts where it says a place.
+    with pytest.raises(host.HostMissing, match=f"if {beside.parents[1]} is yours, name it"):
+        host.find_host("", tmp_path / "c", {"PATH": ""})
+    monkeypatch.chdir(on_path.parent)
+    with pytest.raises(host.HostMissing):
+        host.find_host("", None, {"PATH": os.pathsep.join(["", "."])})
     with pytest.raises(host.HostMissing, match=r"pip install 'headturn\[build\]'"):
         host.find_host("", None, {"PATH": ""})
 

@@ -23,6 +23,7 @@ from generator.execution.build.receipts import RECEIPTS_FILE, Receipts
 from generator.execution.status import LOG_FILE
 from generator.heads.head import SkippedHead
 from generator.messages import BuildOrder
+from generator.names import is_text
 from generator.plan.config import BuildConfig, config_toml, differences, read_recorded
 from generator.plan.pose_plans import POSES_FILE, HeadName, PosePlans, is_drawn, poses_csv
 from generator.plan.poses import pose_name
@@ -44,6 +45,8 @@ Confirm = Callable[[str], bool]
 
 def claim(root: Path) -> None:
     """Make the folder root if it is missing. Raises DatasetError if it holds something else."""
+    if not is_text(str(root)):
+        raise DatasetError(f"{root}: the path holds bytes that are no text in UTF-8; choose another --out")
     try:
         root.mkdir(parents=True, exist_ok=True)
         ours = (root / CONFIG_FILE).is_file() or all(path.name == LOCK_FILE for path in root.iterdir())
