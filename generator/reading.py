@@ -13,13 +13,12 @@ import os
 import re
 import stat
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+# In Blender's Python, which is 3.11 or later, there is no tomli, and in 3.10 there is nothing else.
+tomllib: Any = import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
 
 MAX_STATE_BYTES = 1 << 30
 """Of a file of ours that grows with the dataset: a manifest of a million parts has a third of this."""
