@@ -26,6 +26,7 @@ from generator.execution.build.lock import LOCK_FILE
 from generator.execution.build.placed_heads import PLACED_FILE
 from generator.execution.stopping import Stopped, stoppable
 from generator.plan.config import BuildConfig
+from generator.sealed import sealed_line, unsealed
 
 Built = tuple[BuildConfig, Path]
 
@@ -281,3 +282,22 @@ def test_a_lock_survives_neither_its_holder_nor_others_care(built: Built, tmp_pa
             run(built[0], root)
         started.process.send_signal(signal.SIGCONT)
         assert started.wait() == 0, started.text()
+
+
+def test_a_forged_placement_is_held_against_the_mesh(built: Built, tmp_path: Path) -> None:
+    """By somebody who knows about checksums: the pivot moves and every landmark with it."""
+    root = looked_at(built, tmp_path / "d")
+    lines = []
+    for line in (root / PLACED_FILE).read_text().splitlines():
+        record = unsealed(json.loads(line))
+        placement = record["receipt"]["placement"]
+        placement["pivot"] = [value + 5.0 / placement["mm_per_unit"] for value in placement["pivot"]]
+        lines.append(sealed_line(record))
+    (root / PLACED_FILE).write_text("\n".join(lines) + "\n")
+    with pytest.raises(DatasetError, match="no unit could be built"):
+        run(built[0], root)
+    reasons = [json.loads(line)["reason"] for line in (root / "failures.jsonl").read_text().splitlines()]
+    assert reasons and all("of its anchors are not on its surface" in reason for reason in reasons)
+    (root / PLACED_FILE).unlink()
+    assert run(built[0], root).complete
+    check(root, built)
