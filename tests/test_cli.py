@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -196,3 +197,10 @@ def test_one_interrupt_is_enough_while_it_starts(parametric_heads: Path, tmp_pat
                 started.kill()
         assert (started.returncode, "Traceback" in said) == (130, False), said
         assert said.endswith("headturn: stopped by SIGINT; run the same command again to continue\n")
+
+
+def test_a_program_that_calls_a_command_keeps_its_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "relative")
+    before, path = dict(os.environ), sys.path[:]
+    assert headturn("--version", monkeypatch=monkeypatch) == 0
+    assert (dict(os.environ), sys.path) == (before, path)

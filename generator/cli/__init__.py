@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ``headturn`` command: what people type, and what they see."""
 
+import os
 import sys
 
 
@@ -9,13 +10,19 @@ def main() -> None:
     # Before any other import, even of __future__: see there.
     from generator.interpreter import forget_current_folder
 
-    forget_current_folder()
+    environment, path = os.environ.copy(), sys.path[:]
+    try:
+        forget_current_folder()
+        _run()
+    finally:  # of a program that calls this and goes on
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.path[:] = path
+
+
+def _run() -> None:
     from generator.execution.stopping import Stopped, stoppable
 
-    for stream in (sys.stdout, sys.stderr):
-        # A path may hold what this terminal, or any, cannot show.
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
     try:
         with stoppable():
             from generator.cli.app import main

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import NO_ROWS, add_digests, content_digest
 from generator.dataset.format.files import (
+    check_there,
     file_sha256,
     make_folder,
     one_line,
@@ -72,7 +73,7 @@ def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> Par
     check_name("split", rows.split)
     check_name("unit", unit)
     table = unit_table(rows, schema)
-    make_folder(root)
+    check_there(root)
     if image_mode(schema) == "files":
         # The part that vouches for them comes last, so they need no rename of their own.
         write_files(

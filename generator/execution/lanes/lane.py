@@ -21,7 +21,6 @@ import cv2
 import numpy as np
 
 from generator.content import content_versions
-from generator.dataset.format.files import check_there
 from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
@@ -207,7 +206,6 @@ class Lane:
             schema = part_schema(
                 cast(ImageMode, order.images), versions, order.configuration_digest, topology
             )
-            check_there(Path(order.root))  # one that was moved is not made a second time
             part = commit_unit(rows, schema, Path(order.root), order.unit)
         return Built(part, seconds, versions)
 
