@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -145,6 +146,14 @@ def test_preview_writes_one_picture(
     assert headturn("preview", head, *options, monkeypatch=monkeypatch) == 0
     assert "landmarks found" in capsys.readouterr().out
     assert picture.stat().st_size > 3000
+    copy = tmp_path / "copy"
+    shutil.copytree(head, copy)
+    (copy / "head.json").unlink()
+    with (copy / "neutral.obj").open("a") as mesh:
+        mesh.write("usemtl nothing\nf 1 2 3\n")
+    assert headturn("preview", copy / "neutral.obj", *options, monkeypatch=monkeypatch) == 0
+    said = capsys.readouterr().out
+    assert "licence unknown" in said and "'nothing' is not in the material file" in said
     several = headturn("preview", parametric_heads, "--out", picture, monkeypatch=monkeypatch)
     assert several == 2
     assert "2 subjects" in capsys.readouterr().err

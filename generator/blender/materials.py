@@ -8,9 +8,12 @@ from pathlib import Path
 import bpy
 
 from generator.heads.mesh import Material
+from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 
 VERTEX_COLORS = "Color"
 UV_MAP = "UVMap"
+
+_EXTENSIONS = {EXTEND: "EXTEND", REPEAT: "REPEAT", MIRROR: "MIRROR"}
 
 DIRECTION, STRENGTH = "direction of the light", "strength of the light"
 """Nodes of the fast preset's materials, which :mod:`generator.blender.light` sets."""
@@ -51,15 +54,38 @@ def _base_color(
     if material.texture is not None:
         node = tree.nodes.new("ShaderNodeTexImage")
         node.image = _load_image(material.texture)
-        node.extension = "EXTEND"
-        return node.outputs["Color"], node.outputs["Alpha"]
+        node.extension = _EXTENSIONS[material.wrap]
+        color = node.outputs["Color"]
+        if material.tint != Material.tint:
+            color = _times(tree, color, _constant(tree, material.tint))
+        if material.vertex_tint:
+            color = _times(tree, color, _vertex_colors(tree))
+        return color, node.outputs["Alpha"]
     if has_vertex_colors:
-        node = tree.nodes.new("ShaderNodeVertexColor")
-        node.layer_name = VERTEX_COLORS
-        return node.outputs["Color"], None
+        return _vertex_colors(tree), None
+    return _constant(tree, srgb_to_linear(material.base_color)), None
+
+
+def _vertex_colors(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("ShaderNodeVertexColor")
+    node.layer_name = VERTEX_COLORS
+    return node.outputs["Color"]
+
+
+def _constant(tree: bpy.types.NodeTree, linear: tuple[float, float, float]) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeRGB")
-    node.outputs[0].default_value = (*srgb_to_linear(material.base_color), 1.0)
-    return node.outputs[0], None
+    node.outputs[0].default_value = (*linear, 1.0)
+    return node.outputs[0]
+
+
+def _times(
+    tree: bpy.types.NodeTree, one: bpy.types.NodeSocket, other: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = "MULTIPLY"
+    tree.links.new(one, node.inputs[0])
+    tree.links.new(other, node.inputs[1])
+    return node.outputs[0]
 
 
 def _load_image(path: Path) -> bpy.types.Image:

@@ -38,6 +38,12 @@ _PLAIN = {b"Z": 1, b"Y": 2, b"B": 1, b"C": 1, b"I": 4, b"F": 4, b"D": 8, b"L": 8
 _ARRAYS = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
 _NAMES = (b"RelativeFilename", b"FileName", b"Filename")
 """The importer takes the first of them that is not empty."""
+_NOT_DRAWN = frozenset(
+    b"NormalMap Bump BumpFactor DisplacementColor VectorDisplacementColor SpecularColor SpecularFactor "
+    b"Shininess ShininessExponent ReflectionColor ReflectionFactor EmissiveColor EmissiveFactor".split()
+)
+"""What a texture may be of a material without being seen here: the renderer owns light and gloss."""
+
 _LIMITS = {
     b"Material": MAX_MATERIALS,
     b"Texture": MAX_MATERIALS,
@@ -48,9 +54,11 @@ _LIMITS = {
 
 @dataclass
 class _Picture:
-    """A record Texture or Video. names: of each of _NAMES, as it stands first."""
+    """A record Texture or Video. names: of each of _NAMES, as it stands first. number: that links name it by,
+    0 in files older than those."""
 
     own: str
+    number: int = 0
     names: dict[bytes, str] = field(default_factory=dict)
     content: bytes = b""
 
@@ -60,7 +68,7 @@ class _Picture:
 
 
 def check_fbx(path: Path) -> tuple[str, ...]:
-    """The textures that are missing, a line each.
+    """The textures of colour or opacity that are missing, a line each.
 
     Raises
     ------
@@ -71,7 +79,8 @@ def check_fbx(path: Path) -> tuple[str, ...]:
     check_mesh_file(path)
     try:
         with path.open("rb") as file:
-            pictures = _Reader(file, path.stat().st_size).pictures()
+            reader = _Reader(file, path.stat().st_size)
+            pictures = reader.pictures()
     except (ValueError, struct.error, zlib.error) as error:
         raise HeadError(f"not a binary FBX that can be read ({error}); export it again, or as GLB") from error
     embedded = {picture.name for picture in pictures if picture.content}
@@ -83,7 +92,8 @@ def check_fbx(path: Path) -> tuple[str, ...]:
             elif picture.name and picture.name not in embedded:
                 check_picture(find_below(path.parent, picture.name, "texture"), picture.name)
         except MissingFile as error:
-            problems.append(str(error))
+            if reader.is_drawn(picture):
+                problems.append(str(error))
     return tuple(dict.fromkeys(problems))
 
 
@@ -93,6 +103,8 @@ class _Reader:
         self._records, self._bytes = 0, 0
         self._counts = dict.fromkeys(_LIMITS, 0)
         self._pictures: list[_Picture] = []
+        self._drawn: dict[int, bool] = {}
+        self._above: dict[int, set[int]] = {}
 
     def pictures(self) -> list[_Picture]:
         """Every record Texture and Video. ValueError: malformed; HeadError: too large."""
@@ -104,6 +116,13 @@ class _Reader:
         while self._record(self._size, 0, None):
             pass
         return self._pictures
+
+    def is_drawn(self, picture: _Picture) -> bool:
+        """Is it used for more than what :data:`_NOT_DRAWN` names? So it is where nothing is known of it."""
+        # A video belongs to a texture, a texture to a property of a material.
+        numbers = {picture.number, *self._above.get(picture.number, ())}
+        uses = [self._drawn[number] for number in numbers if number in self._drawn]
+        return not uses or any(uses)
 
     def _record(self, limit: int, depth: int, parent: _Picture | None) -> bool:
         """Walk a record that ends at limit or before; False for the empty one at the end of a list."""
@@ -119,11 +138,15 @@ class _Reader:
         if name in _LIMITS:
             self._counts[name] += 1
             check_count(self._counts[name], _LIMITS[name], f"records {name.decode()}")
-        wanted = name in (b"Texture", b"Video") or (parent is not None and name in (*_NAMES, b"Content"))
-        values = list(self._properties(count, wanted))
+        wanted = name in (b"Texture", b"Video", b"C") or (
+            parent is not None and name in (*_NAMES, b"Content")
+        )
+        properties = list(self._properties(count, wanted))
+        values = [value for value in properties if isinstance(value, bytes)]
+        numbers = [value for value in properties if isinstance(value, int)]
         if self._file.tell() != start + length:
             raise ValueError("the properties of a record have another length than it says")
-        picture = self._picture(name, values, parent)
+        picture = self._picture(name, values, numbers, parent)
         if self._file.tell() < end:
             while self._file.tell() < end and self._record(end, depth + 1, picture):
                 pass
@@ -131,12 +154,21 @@ class _Reader:
             raise ValueError("a record has another length than it says")
         return True
 
-    def _picture(self, name: bytes, values: list[bytes], parent: _Picture | None) -> _Picture | None:
+    def _picture(
+        self, name: bytes, values: list[bytes], numbers: list[int], parent: _Picture | None
+    ) -> _Picture | None:
         """What the record's children belong to."""
         if name in (b"Texture", b"Video"):
             own = next((value.partition(b"\0\1")[0] for value in values if b"\0\1" in value), b"")
-            self._pictures.append(_Picture(own.decode("utf-8", "replace")))
+            number = numbers[0] if numbers else 0
+            self._pictures.append(_Picture(own.decode("utf-8", "replace"), number))
             return self._pictures[-1]
+        if name == b"C" and len(numbers) == 2:
+            child, above = numbers
+            if len(values) == 2:  # the kind of link, and the property of a material
+                self._drawn[child] = self._drawn.get(child, False) or values[1] not in _NOT_DRAWN
+            else:
+                self._above.setdefault(child, set()).add(above)
         if parent is not None and values:
             if name == b"Content":
                 parent.content = parent.content or values[0]
@@ -146,11 +178,13 @@ class _Reader:
                 parent.names.setdefault(name, values[0].decode("utf-8", "replace"))
         return None
 
-    def _properties(self, count: int, wanted: bool) -> Iterator[bytes]:
-        """The text and binary properties of a record, if they are wanted."""
+    def _properties(self, count: int, wanted: bool) -> Iterator[bytes | int]:
+        """The text and binary properties of a record and its numbers of 64 bits, if they are wanted."""
         for _ in range(count):
             kind = self._read(1)
-            if kind in _PLAIN:
+            if kind == b"L" and wanted:
+                yield int.from_bytes(self._read(8), "little")
+            elif kind in _PLAIN:
                 self._skip(_PLAIN[kind])
             elif kind in _ARRAYS:
                 number, encoding, stored = struct.unpack("<III", self._read(12))

@@ -15,7 +15,7 @@ from generator.heads.gltf_file import gltf_files
 from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
 from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key
-from generator.heads.ply import ply_texture
+from generator.heads.ply import ply_textures
 
 SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".fbx")
 """Where one head comes in several formats, the first of these is read."""
@@ -165,8 +165,7 @@ def _textures(mesh: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         case ".obj":
             return obj_files(mesh)
         case ".ply":
-            texture = ply_texture(mesh)
-            return ((texture,) if texture else ()), ()
+            return ply_textures(mesh), ()
         case ".gltf":
             return gltf_files(mesh), ()
         case ".fbx":

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import json
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -35,6 +35,7 @@ from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SEE_THROUGH, SKIN
 from generator.heads.paths import find_inside
 from generator.heads.textures import Textures, open_image
+from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 
 # Anything in the JSON may be missing or of another kind than the standard says.
 # Of trimesh, too: where it has no value for a variable, that is a NameError.
@@ -42,6 +43,9 @@ _MALFORMED = (
     *(LookupError, TypeError, AttributeError, ValueError, AssertionError, RecursionError),
     *(NameError, ArithmeticError, NotImplementedError, struct.error),
 )
+_WRAPS = {33071: EXTEND, 33648: MIRROR, 10497: REPEAT}
+WHITE = 1 - 0.5 / 255
+"""Vertex colours are drawn with eight bits: from here on they are 1."""
 _UNTRANSFORMED = {"offset": [0, 0], "scale": [1, 1], "rotation": 0}
 
 
@@ -66,7 +70,8 @@ class _Folder(Resolver):
 
 @dataclass(frozen=True)
 class _Source:
-    """A glTF material. color: sRGB, None if not given. factor: the same, linear. mode: alphaMode."""
+    """A glTF material. color: sRGB, None if not given. factor: the same, linear. mode: alphaMode.
+    wraps: how the texture goes on along u and v. note: what of it is not drawn."""
 
     name: str
     color: tuple[float, float, float] | None = None
@@ -74,6 +79,8 @@ class _Source:
     opacity: float = 1.0
     mode: str = "OPAQUE"
     texture: Path | None = None
+    wraps: tuple[str, str] = (REPEAT, REPEAT)
+    note: str = ""
 
 
 def read_gltf(path: Path, scratch: Path) -> HeadMesh:
@@ -106,16 +113,18 @@ def _materials(
     images: dict[int | str, Path] = {}
     result = []
     for index, material in enumerate(header.get("materials", [])):
-        pbr = material.get("pbrMetallicRoughness", {})
-        factor = [float(x) for x in pbr.get("baseColorFactor", (1, 1, 1, 1))]
-        reference = pbr.get("baseColorTexture")
-        texture = None
+        color, reference = _base_color(material)
+        factor = [float(x) for x in color or (1, 1, 1, 1)]
+        texture, wraps = None, _Source.wraps
         if reference is not None:
             transform = reference.get("extensions", {}).get("KHR_texture_transform", {})
             moved = any(transform.get(key, same) != same for key, same in _UNTRANSFORMED.items())
             if moved or reference.get("texCoord", 0) != 0:
                 raise HeadError("a texture uses a second or transformed set of coordinates; bake them")
-            number = header["textures"][reference["index"]]["source"]
+            entry = header["textures"][reference["index"]]
+            sampler = header["samplers"][entry["sampler"]] if "sampler" in entry else {}
+            wraps = (_WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)])
+            number = entry["source"]
             image = header["images"][number]
             # Many images of a file may share their bytes.
             content: int | str = image["bufferView"] if "bufferView" in image else image["uri"]
@@ -124,17 +133,31 @@ def _materials(
                 textures.check(images[content])
             texture = images[content]
         red, green, blue = (float(x) for x in _srgb(np.array(factor[:3])))
+        name = str(material.get("name", f"material{index}"))
+        unseen = texture is None and "emissiveTexture" in material
         result.append(
             _Source(
-                name=str(material.get("name", f"material{index}")),
-                color=(red, green, blue) if "baseColorFactor" in pbr else None,
+                name=name,
+                color=None if color is None else (red, green, blue),
                 factor=np.array(factor[:3]),
                 opacity=factor[3],
                 mode=str(material.get("alphaMode", "OPAQUE")),
                 texture=texture,
+                wraps=wraps,
+                note=f"the emissive texture of {quoted(name)} is not drawn" if unseen else "",
             )
         )
     return [*result, _Source("skin")]
+
+
+def _base_color(material: dict[str, Any]) -> tuple[Any, Any]:
+    """Factor and texture of a material, None where there is none. Where it has both kinds of colour, those of
+    KHR_materials_pbrSpecularGlossiness are what the extension asks for."""
+    glossy = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    if glossy is not None:
+        return glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
+    pbr = material.get("pbrMetallicRoughness", {})
+    return pbr.get("baseColorFactor"), pbr.get("baseColorTexture")
 
 
 def _image(header: dict[str, Any], binary: bytes, number: int, path: Path, scratch: Path) -> Path:
@@ -190,6 +213,7 @@ def _bare_primitive(primitive: dict[str, Any], none: int, header: dict[str, Any]
 def _assemble(scene: trimesh.Scene, sources: list[_Source], textures: Textures) -> HeadMesh:
     vertices, triangles, uvs, colors, index = [], [], [], [], []
     used: dict[int, int] = {}
+    tinted: set[int] = set()
     problems, offset, count, colored = [], 0, 0, False
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
@@ -218,39 +242,61 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source], textures: Textures) 
         uvs.append(np.zeros((len(faces), 3, 2), np.float32) if uv is None else np.asarray(uv)[faces])
         color = mesh.visual.vertex_attributes.get("color")
         colored |= color is not None
+        if source.note:
+            problems.append(source.note)
         if color is None and source.color is None and source.texture is None:
             problems.append(f"no texture or colour for {quoted(source.name)}; drawn as plain skin")
         colors.append(_vertex_colors(color, source, len(mesh.vertices)))
+        if source.texture and (colors[-1] < WHITE).any():
+            tinted.add(number)
         index.append(np.full(len(faces), used.setdefault(number, len(used)), dtype=np.int32))
     if not vertices:
         raise HeadError("the file has no triangles that can be seen")
     all_uv, all_index = np.concatenate(uvs).astype(np.float32), np.concatenate(index)
-    materials = tuple(_material(sources[n], all_uv[all_index == i], textures) for n, i in used.items())
+    materials = []
+    for number, place in used.items():
+        of_material = all_index == place
+        material, all_uv[of_material], notes = _material(
+            sources[number], number in tinted, all_uv[of_material], textures
+        )
+        materials.append(material)
+        problems += notes
+    needed = tinted or not all(m.texture for m in materials)
     return HeadMesh(
         vertices=np.concatenate(vertices),
         triangles=np.concatenate(triangles).astype(np.int32),
         uv=all_uv if any(m.texture for m in materials) else None,
-        vertex_colors=np.concatenate(colors) if colored and not all(m.texture for m in materials) else None,
+        vertex_colors=np.concatenate(colors) if colored and needed else None,
         material_index=all_index,
-        materials=materials,
+        materials=tuple(materials),
         problems=tuple(dict.fromkeys(problems)),
     )
 
 
-def _material(source: _Source, uv: np.ndarray, textures: Textures) -> Material:
-    texture = source.texture
-    cutout = texture is not None and textures.has_holes(texture, uv) and source.mode != "OPAQUE"
-    return Material(source.name, source.color or SKIN, texture, cutout)
+def _material(
+    source: _Source, tinted: bool, uv: np.ndarray, textures: Textures
+) -> tuple[Material, np.ndarray, list[str]]:
+    """A material, the coordinates of its triangles in the image, and notes. tinted: by vertex colours."""
+    material = Material(source.name, source.color or SKIN, source.texture)
+    if source.texture is None:
+        return material, uv, []
+    red, green, blue = source.factor.tolist()
+    material = replace(material, tint=(red, green, blue), vertex_tint=tinted)
+    return textures.lay(material, uv, source.wraps, cut=source.mode != "OPAQUE")
 
 
 def _vertex_colors(values: np.ndarray | None, source: _Source, count: int) -> np.ndarray:
-    """sRGB of linear COLOR_0 times the base colour (glTF 2.0, 3.9.2); the base colour without COLOR_0."""
+    """sRGB of linear COLOR_0 times the base colour (glTF 2.0, 3.9.2); the base colour without COLOR_0.
+
+    Of a textured material it is COLOR_0 alone, and 1 without it: the base colour is the texture's tint.
+    """
     if values is None:
-        return np.full((count, 3), source.color or SKIN, dtype=np.float32)
+        plain = 1.0 if source.texture else source.color or SKIN
+        return np.full((count, 3), plain, dtype=np.float32)
     color = np.asarray(values)[:, :3]
     if np.issubdtype(color.dtype, np.integer):
         color = color / np.iinfo(color.dtype).max
-    return _srgb(color * source.factor)
+    return _srgb(color if source.texture else color * source.factor)
 
 
 def _srgb(linear: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError
+from generator.heads.tiling import EXTEND
 
 
 @dataclass(frozen=True)
@@ -18,12 +19,18 @@ class Material:
     base_color: sRGB 0-1, used where there is neither texture nor vertex colour.
     texture: an image file on disk. cutout: its alpha channel makes holes
     (lashes, hair cards).
+    tint: linear factors of the texture. vertex_tint: vertex colours are factors
+    of the texture, too. wrap: how the texture goes on beyond 0-1, see
+    :mod:`generator.heads.tiling`.
     """
 
     name: str
     base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
     texture: Path | None = None
     cutout: bool = False
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    vertex_tint: bool = False
+    wrap: str = EXTEND
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,17 @@ log line and a grey mesh. Here a missing texture is an error.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.colors import unit_colors
 from generator.heads.limits import MAX_MATERIALS, check_count, read_mesh_bytes
 from generator.heads.mesh import HeadMesh, Material
-from generator.heads.mtl import MtlMaterial, decode, find_library, find_stem_texture, read_mtl
+from generator.heads.mtl import MtlMaterial, decode, find_libraries, find_stem_texture, read_mtl
 from generator.heads.paths import MissingFile, find_inside
 from generator.heads.textures import Textures, combine_alpha
 
@@ -75,7 +76,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
     if texture:
         entries = dict.fromkeys(names, MtlMaterial(texture=texture.name))
     else:
-        entries, problems = _library(path, names)
+        entries, problems = _library(path, names, colored=colors is not None)
     uv = table[corner_uv]
     textures = Textures()
     materials, keep = [], np.ones(len(position), dtype=bool)
@@ -85,7 +86,18 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
             keep &= ~of_material
             problems.append(f"the see-through material {quoted(name)} is left out")
         uv[of_material] = uv[of_material] * entry.scale + entry.offset
-        materials.append(_material(path, scratch, textures, name, index, entry, uv[of_material]))
+        material = Material(name or "skin", entry.color or SKIN)
+        if entry.texture:
+            material, uv[of_material] = _textured(
+                path, scratch, textures, index, material, entry, uv[of_material]
+            )
+            if bare := int((corner_uv[of_material] == 0).any(axis=1).sum()):
+                problems.append(
+                    f"{bare} triangles of the textured {quoted(name)} have no texture coordinates"
+                )
+        materials.append(material)
+        if entry.ambient:
+            problems.append(f"the material {quoted(name)} has its texture as map_Ka alone; drawn with it")
         if entry.color is None and not entry.texture and colors is None:
             problems.append(f"no texture or colour for the material {quoted(name)}; drawn as plain skin")
     if not keep.any():
@@ -165,9 +177,7 @@ def _vertex_arrays(obj: _Obj) -> tuple[np.ndarray, np.ndarray | None]:
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise HeadError("a vertex line is not made of three numbers; export the mesh again")
     if colors is not None:
-        if not np.isfinite(colors).all():
-            raise HeadError("a vertex colour is not a finite number; export the mesh again")
-        colors = np.clip(colors / (255.0 if colors.max() > 1 else 1.0), 0, 1).astype(np.float32)
+        colors = unit_colors(colors)
     return vertices, colors
 
 
@@ -181,41 +191,58 @@ def _triangulate(obj: _Obj) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.repeat(np.array(obj.face_material, dtype=np.int32), triangles)
 
 
-def _library(path: Path, names: list[str]) -> tuple[dict[str, MtlMaterial], list[str]]:
-    """An entry for each name the faces use, from the MTL or from an image beside the mesh."""
-    library = find_library(path)
-    known = read_mtl(library) if library else {}
+def _library(path: Path, names: list[str], *, colored: bool) -> tuple[dict[str, MtlMaterial], list[str]]:
+    """An entry for each name the faces use, from the MTLs or from an image beside the mesh.
+
+    colored: the mesh can do without them. Raises MissingFile: it cannot, and an MTL that it names is missing;
+    where it can, :func:`obj_files` has noted that.
+    """
+    libraries = find_libraries(path)
+    known: dict[str, MtlMaterial] = {}
+    for file in libraries.files:
+        known = read_mtl(file) | known  # of two materials of one name the first is meant
+    problems: list[str] = []
     if not known:
         image = find_stem_texture(path)
-        return {name: MtlMaterial(texture=image.name if image else None) for name in names}, []
+        if libraries.missing and not image and not colored:
+            raise MissingFile(libraries.missing[0])
+        return {name: MtlMaterial(texture=image.name if image else None) for name in names}, problems
     if len(known) == 1 and len(names) == 1:
-        return {names[0]: next(iter(known.values()))}, []
+        (only,) = known
+        if names[0] and names[0] != only:
+            what = f"the material {quoted(names[0])} is not in the material file"
+            problems.append(f"{what}; drawn as {quoted(only)}, the only one there")
+        return {names[0]: known[only]}, problems
     missing = [name for name in names if name and name not in known]
-    problems = [f"the material {quoted(name)} is not in the material file" for name in missing]
+    if missing and libraries.missing and not colored:
+        raise MissingFile(libraries.missing[0])
+    problems += [f"the material {quoted(name)} is not in the material file" for name in missing]
     return {name: known.get(name, MtlMaterial()) for name in names}, problems
 
 
-def _material(
+def _textured(
     path: Path,
     scratch: Path,
     textures: Textures,
-    name: str,
     index: int,
+    material: Material,
     entry: MtlMaterial,
     uv: np.ndarray,
-) -> Material:
-    color = entry.color or SKIN
-    if not entry.texture:
-        return Material(name or "skin", color)
+) -> tuple[Material, np.ndarray]:
+    """A material with its texture, and its coordinates, float64 [T, 3, 2], brought back into that."""
+    assert entry.texture is not None, "asked for materials with a texture alone"
     texture = find_inside(path.parent, entry.texture, "texture")
     textures.check(texture)
+    wraps = (entry.wrap, entry.wrap)
     if entry.opacity_map and entry.opacity_map != entry.texture:
         opacity = find_inside(path.parent, entry.opacity_map, "opacity map")
         combined = scratch / f"{path.stem}-cutout{index}.png"
         combine_alpha(texture, opacity, combined)
-        if textures.has_holes(combined, uv):
-            return Material(name, color, combined, cutout=True)
-    return Material(name, color, texture, cutout=textures.has_holes(texture, uv))
+        laid, moved, _ = textures.lay(replace(material, texture=combined), uv, wraps)
+        if laid.cutout:
+            return laid, moved
+    laid, moved, _ = textures.lay(replace(material, texture=texture), uv, wraps)
+    return laid, moved
 
 
 def obj_files(path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
@@ -225,12 +252,12 @@ def obj_files(path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     ------
     HeadError: the MTL is broken or names a file outside of the folder.
     """
-    library = find_library(path)
-    if library is None:
-        image = find_stem_texture(path)
-        return ((image,) if image else ()), ()
-    files, problems = {library: None}, []
-    for material in read_mtl(library).values():
+    libraries = find_libraries(path)
+    files, problems = dict.fromkeys(libraries.files), list(libraries.missing)
+    known = [material for file in libraries.files for material in read_mtl(file).values()]
+    if not known and (image := find_stem_texture(path)):
+        files[image] = None
+    for material in known:
         for name in (material.texture, material.opacity_map):
             try:
                 if name:

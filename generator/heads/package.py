@@ -23,6 +23,9 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
             "base_color": list(m.base_color),
             "texture": str(m.texture) if m.texture else None,
             "cutout": m.cutout,
+            "tint": list(m.tint),
+            "vertex_tint": m.vertex_tint,
+            "wrap": m.wrap,
         }
         for m in mesh.materials
     ]
@@ -40,7 +43,10 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
 
 
 def load_package(path: Path) -> HeadMesh:
-    """The inverse of :func:`save_package`. Never unpickles."""
+    """The inverse of :func:`save_package`. Never unpickles.
+
+    Packages of earlier releases say nothing of tints and wrap, and knew neither.
+    """
     with np.load(path, allow_pickle=False) as data:
         materials = tuple(
             Material(
@@ -48,6 +54,9 @@ def load_package(path: Path) -> HeadMesh:
                 tuple(m["base_color"]),
                 Path(m["texture"]) if m["texture"] else None,
                 m["cutout"],
+                tuple(m.get("tint", Material.tint)),
+                m.get("vertex_tint", Material.vertex_tint),
+                m.get("wrap", Material.wrap),
             )
             for m in json.loads(str(data["materials"]))
         )

@@ -1,46 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PLY through trimesh: ASCII and binary, vertex colours, one texture named in the header."""
+"""PLY through trimesh: ASCII and binary, vertex colours, textures named in the header."""
 
 from __future__ import annotations
 
 import io
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from trimesh.exchange.ply import load_ply
 from trimesh.geometry import triangulate_quads
 
 from generator.errors import HeadError
-from generator.heads.limits import check_mesh_file, read_mesh_bytes
+from generator.heads.colors import unit_colors
+from generator.heads.limits import MAX_MATERIALS, check_count, check_mesh_file, read_mesh_bytes
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SKIN
 from generator.heads.paths import find_inside
 from generator.heads.textures import Textures
+from generator.heads.tiling import REPEAT
 
 HEADER_BYTES = 1 << 16
 
 
 def read_ply(path: Path) -> HeadMesh:
-    """A PLY with its texture, if the header names one.
+    """A PLY with its textures, if the header names any.
 
     Raises
     ------
-    HeadError: the file cannot be parsed, or its texture is missing, outside
+    HeadError: the file cannot be parsed, or a texture is missing, outside
         of the folder or not an image.
     """
-    texture, textures = ply_texture(path), Textures()
-    if texture:
-        textures.check(texture)
+    images, textures = ply_textures(path), Textures()
+    for image in images:
+        textures.check(image)
     try:
         with warnings.catch_warnings():
             # numpy's word for a line of numbers that holds something else
             warnings.simplefilter("error", DeprecationWarning)
             # Without a texture the vertices must stay as they are, in step with their colours.
-            data = load_ply(io.BytesIO(read_mesh_bytes(path)), fix_texture=bool(texture), skip_materials=True)
+            data = load_ply(io.BytesIO(read_mesh_bytes(path)), fix_texture=bool(images), skip_materials=True)
             vertices = np.asarray(data.get("vertices", ()), dtype=np.float64)
             triangles = _triangles(data.get("faces"))
-            colors = None if texture else _colors(data.get("vertex_colors"), len(vertices))
+            colors = None if images else _colors(data.get("vertex_colors"), len(vertices))
+            index = _texture_numbers(data, len(images), len(triangles))
     except (HeadError, OSError):
         raise
     except Exception as error:  # trimesh raises whatever a malformed file makes it stumble over
@@ -52,40 +56,63 @@ def read_ply(path: Path) -> HeadMesh:
         raise HeadError(f"a face uses a vertex outside of 0 to {len(vertices) - 1}; export the mesh again")
     uv = getattr(data.get("visual"), "uv", None)
     problems = []
-    if texture and uv is None:
-        raise HeadError(f"the mesh names the texture {texture.name} but has no texture coordinates")
-    if texture is None and colors is None:
+    if images and uv is None:
+        raise HeadError(f"the mesh names the texture {images[0].name} but has no texture coordinates")
+    if not images and colors is None:
         problems.append("no texture or vertex colours; drawn as plain skin")
-    corner_uv = np.asarray(uv, dtype=np.float32)[triangles] if texture else None
-    cutout = texture is not None and corner_uv is not None and textures.has_holes(texture, corner_uv)
+    corner_uv = np.asarray(uv, dtype=np.float32)[triangles] if images else None
+    materials = [Material("skin", SKIN, image) for image in images] or [Material("skin", SKIN)]
+    if corner_uv is not None:
+        for number, material in enumerate(materials):
+            own = index == number
+            materials[number], corner_uv[own], _ = textures.lay(material, corner_uv[own], (REPEAT, REPEAT))
     return HeadMesh(
         vertices=vertices,
         triangles=triangles.astype(np.int32),
         uv=corner_uv,
         vertex_colors=colors,
-        material_index=np.zeros(len(triangles), dtype=np.int32),
-        materials=(Material("skin", SKIN, texture, cutout),),
+        material_index=index,
+        materials=tuple(materials),
         problems=tuple(problems),
     )
 
 
-def ply_texture(path: Path) -> Path | None:
-    """The image of the header's ``comment TextureFile``, else None.
+def ply_textures(path: Path) -> tuple[Path, ...]:
+    """The images of the header's lines ``comment TextureFile``, in their order.
 
     Raises
     ------
-    HeadError: no PLY header, or the image is missing or outside of the folder.
+    HeadError: no PLY header, or an image is missing or outside of the folder.
     """
     check_mesh_file(path)
     with path.open("rb") as file:
         header, end, _ = file.read(HEADER_BYTES).partition(b"end_header")
     if not header.startswith(b"ply") or not end:
         raise HeadError("the file has no PLY header")
-    for line in header.decode("latin-1").splitlines():
-        words = line.split(None, 2)
-        if len(words) == 3 and words[0] == "comment" and words[1].lower() == "texturefile":
-            return find_inside(path.parent, words[2], "texture")
-    return None
+    lines = [line.split(None, 2) for line in header.decode("latin-1").splitlines()]
+    names = [line[2] for line in lines if len(line) == 3 and line[0] == "comment"
+             and line[1].lower() == "texturefile"]  # fmt: skip
+    check_count(len(names), MAX_MATERIALS, "textures")
+    return tuple(find_inside(path.parent, name, "texture") for name in names)
+
+
+def _texture_numbers(data: dict[str, Any], images: int, triangles: int) -> np.ndarray:
+    """Which image each triangle has, int32 [T]: the property ``texnumber`` of the faces."""
+    if images < 2:
+        return np.zeros(triangles, dtype=np.int32)
+    faces = data["metadata"]["_ply_raw"]["face"]
+    if "texnumber" not in faces["properties"]:
+        raise HeadError(
+            "the header names several textures, but no face its texnumber; keep one, or export GLB"
+        )
+    numbers = np.asarray(faces["data"]["texnumber"]).reshape(-1)
+    if not ((numbers >= 0) & (numbers < images)).all():
+        raise HeadError(f"a face has a texnumber outside of 0 to {images - 1}; export the mesh again")
+    if np.shape(data["faces"]) == (len(numbers), 4):
+        numbers = np.tile(numbers, 2)  # as triangulate_quads puts all first halves before the second ones
+    if len(numbers) != triangles:
+        raise HeadError("faces of several textures have different numbers of corners; export triangles")
+    return numbers.astype(np.int32)
 
 
 def _triangles(faces: np.ndarray | None) -> np.ndarray:
@@ -97,11 +124,14 @@ def _triangles(faces: np.ndarray | None) -> np.ndarray:
 
 
 def _colors(values: np.ndarray | None, count: int) -> np.ndarray | None:
-    """sRGB 0-1 of integers of any width or of floats; None where there are none."""
+    """sRGB 0-1 of integers of any width or of floats; None where there are none.
+
+    Integers of more than eight bits that stay below 256 are 0-255 all the same.
+    """
     if values is None or len(values) != count:
         return None
     colors = np.asarray(values)[:, :3]
-    scale = np.iinfo(colors.dtype).max if np.issubdtype(colors.dtype, np.integer) else 1.0
-    if not np.isfinite(colors).all():
-        raise HeadError("a vertex colour is not a finite number; export the mesh again")
-    return np.clip(colors / scale, 0, 1).astype(np.float32)
+    whole = np.issubdtype(colors.dtype, np.integer)
+    if whole and (colors.dtype.itemsize == 1 or colors.max(initial=0) > 255):
+        return np.clip(colors / np.iinfo(colors.dtype).max, 0, 1).astype(np.float32)
+    return unit_colors(colors)

@@ -61,6 +61,7 @@ def _read(path: Path, scratch: Path, import_with_blender: ImportWithBlender | No
         case ".fbx":
             if import_with_blender is None:
                 raise HeadError("FBX is read by Blender, which is not available here; convert it to GLB")
-            check_fbx(path)
+            if missing := check_fbx(path):
+                raise HeadError(missing[0])
             return read_gltf(import_with_blender(path, scratch), scratch)
     raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB or FBX")

@@ -7,6 +7,7 @@ import contextlib
 import struct
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,6 +17,8 @@ from PIL import Image, UnidentifiedImageError
 from generator.errors import HeadError
 from generator.escape import quoted
 from generator.heads.limits import MAX_PIXELS, MAX_TEXTURE_PIXELS, check_mesh_file
+from generator.heads.mesh import Material
+from generator.heads.tiling import EXTEND, bring_back, needs_both, texels
 
 FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "TGA", "WEBP")
 """What both Pillow and Blender read."""
@@ -98,7 +101,33 @@ class Textures:
         """Decode all of an image, so that a truncated one is found before a renderer paints it pink."""
         self._alpha_of(path)
 
-    def has_holes(self, path: Path, uv: np.ndarray) -> bool:
+    def lay(
+        self, material: Material, uv: np.ndarray, wraps: tuple[str, str], *, cut: bool = True
+    ) -> tuple[Material, np.ndarray, list[str]]:
+        """A textured material as some triangles use it.
+
+        Parameters
+        ----------
+        material: with a texture. uv: float [T, 3, 2], v up, of its triangles. wraps: how the texture goes
+            on along u and along v. cut: may its alpha channel make holes?
+
+        Returns
+        -------
+        The material with ``wrap`` and ``cutout``, its coordinates brought back into the image where they
+        can be, and what is to be noted.
+        """
+        assert material.texture is not None, "only textures are laid"
+        uv, wrap = bring_back(uv, wraps)
+        notes = []
+        if needs_both(uv, wraps):
+            notes.append(
+                f"the texture of {quoted(material.name)} goes on along u as {wraps[0]}, along v as {wraps[1]}"
+                f"; drawn as {wrap}"
+            )
+        cutout = self.has_holes(material.texture, uv, wrap) and cut
+        return replace(material, wrap=wrap, cutout=cutout), uv, notes
+
+    def has_holes(self, path: Path, uv: np.ndarray, wrap: str = EXTEND) -> bool:
         """Does the alpha channel make holes where triangles use the texture?
 
         Unused corners of an atlas are often transparent, and some exporters leave
@@ -106,7 +135,8 @@ class Textures:
 
         Parameters
         ----------
-        path: image. uv: float [T, 3, 2], v up, of the triangles drawn with it.
+        path: image. uv: float [T, 3, 2], v up, of the triangles drawn with it. wrap: how it goes on
+            beyond 0-1.
 
         Raises
         ------
@@ -117,7 +147,7 @@ class Textures:
                 f"a texture coordinate of {path.name} is not a finite number; export the mesh again"
             )
         alpha = self._alpha_of(path)
-        return alpha is not None and len(uv) > 0 and _holes(alpha, uv)
+        return alpha is not None and len(uv) > 0 and _holes(alpha, uv, wrap)
 
     def _alpha_of(self, path: Path) -> np.ndarray | None:
         """uint8 [H, W], None of an image that is solid or transparent throughout."""
@@ -179,18 +209,15 @@ def _alpha(image: Image.Image) -> np.ndarray | None:
     return None if alpha.min() >= OPAQUE or alpha.max() < OPAQUE else alpha
 
 
-def _holes(alpha: np.ndarray, uv: np.ndarray) -> bool:
+def _holes(alpha: np.ndarray, uv: np.ndarray, wrap: str) -> bool:
     side = int(np.clip(np.sqrt(_SAMPLES / len(uv)), 3, 64))
     # Cell centres of a barycentric grid: all inside, so that the border of an atlas island does not count.
     a, b = (grid.ravel() for grid in np.mgrid[0:side, 0:side])
     inside = a + b < side
     weights = (np.stack([a, b], axis=1)[inside] + 1 / 3) / side
     weights = np.column_stack([weights, 1 - weights.sum(1)])
-    points = np.einsum("kc,tcd->tkd", weights, uv) % 1.0
-    height, width = alpha.shape
-    columns = np.minimum((points[..., 0] * width).astype(int), width - 1)
-    rows = np.minimum(((1.0 - points[..., 1]) * height).astype(int), height - 1)
-    return float((alpha[rows, columns] < OPAQUE).mean()) > HOLES
+    points = np.einsum("kc,tcd->tkd", weights, uv)
+    return float((alpha[texels(points, wrap, alpha.shape)] < OPAQUE).mean()) > HOLES
 
 
 def combine_alpha(color: Path, opacity: Path, target: Path) -> None:

@@ -15,6 +15,7 @@ from generator.errors import HeadError
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
 from generator.heads.textures import alpha_channel
+from generator.heads.tiling import texels
 from generator.plan.views import Views
 
 HOLES = 8
@@ -62,6 +63,7 @@ class Surface:
         )
         self._uv = mesh.uv
         self._material_index = mesh.material_index
+        self._wrap = [m.wrap for m in mesh.materials]
         self._alpha = [
             _alpha(m.texture) if m.cutout and m.texture is not None and mesh.uv is not None else None
             for m in mesh.materials
@@ -180,13 +182,11 @@ class Surface:
             return holes
         for row in np.flatnonzero(self._may_be_hole[triangles]):
             triangle = triangles[row]
-            alpha = self._alpha[self._material_index[triangle]]
+            material = self._material_index[triangle]
+            alpha = self._alpha[material]
             assert alpha is not None, "only triangles of cut-out materials may be holes"
-            u, v = weights[row] @ self._uv[triangle].astype(np.float64)
-            height, width = alpha.shape
-            x = int(np.clip(u * width, 0, width - 1))
-            y = int(np.clip((1 - v) * height, 0, height - 1))
-            holes[row] = alpha[y, x] < 128
+            uv = weights[row] @ self._uv[triangle].astype(np.float64)
+            holes[row] = alpha[texels(uv, self._wrap[material], alpha.shape)] < 128
         return holes
 
 

@@ -136,6 +136,8 @@ def test_axes_and_units_are_found(parametric_heads: Path, tmp_path: Path) -> Non
     [guessed], [known] = read_heads(tmp_path / "a"), read_heads(tmp_path / "b")
     assert (guessed.units, guessed.up, guessed.forward) == ("m", "+Z", "-Y")
     assert any("units guessed: m" in note for note in reporter.notes)
+    assert "blenderish/neutral: licence unknown" in reporter.notes
+    assert all(any(problem in note for note in reporter.notes) for problem in guessed.problems)
     x, y, z = known.pivot
     assert np.allclose(np.array(guessed.pivot) * 1000, [x + 3000, -z + 1000, y - 2000], atol=2)
 

@@ -160,6 +160,14 @@ def test_a_subject_that_breaks_its_lane_is_left_out(dry: DryBuild) -> None:
     dry.check()
 
 
+def test_every_note_about_a_head_is_said_once(dry: DryBuild) -> None:
+    """What ``heads list`` knows: of the files, and of the mesh."""
+    assert dry.build().complete
+    [licence] = [note for note in dry.said.notes if "licence" in note]
+    assert licence == "amy/neutral and 1 more: licence unknown"
+    dry.check()
+
+
 def test_without_a_head_nothing_is_built(dry: DryBuild) -> None:
     lanes = NoRenderer()
     lanes.bad_heads.update({"amy/neutral": "too small", "bob/neutral": "too large"})

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import subprocess
 import sys
 import zlib
@@ -13,8 +14,11 @@ import pytest
 from hostile_files import JP2, Fbx, fbx, fbx_array, fbx_text, png
 from PIL import Image
 
+from generator.errors import HeadError
 from generator.execution.lanes.renderer import Renderer
+from generator.heads.fbx import check_fbx
 from generator.heads.gltf_file import split_gltf
+from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
 
 OUTSIDE = "outside of the head's folder"
@@ -87,6 +91,38 @@ def test_an_fbx_of_another_machine_finds_its_texture_in_the_folder(tmp_path: Pat
         (folder / "head.fbx").write_bytes(fbx(name))
     heads = find_heads(tmp_path).heads
     assert [any("missing" in p for p in head.problems) for head in heads] == [False, False, False, True]
+
+
+def linked_fbx(*uses: str) -> bytes:
+    """A video gone.png of a texture that is used for some properties of a material."""
+    video, texture, material = ((b"L" + struct.pack("<q", number)) for number in (1 << 40 | 1, 256, 3))
+    name = [("RelativeFilename", (fbx_text("gone.png"),), ())]
+    links = [(fbx_text("OO"), video, texture)]
+    links += [(fbx_text("OP"), texture, material, fbx_text(use)) for use in uses]
+    file = Fbx()
+    objects = [
+        ("Material", (material,), ()),
+        ("Texture", (texture, fbx_text(b"skin\0\1Texture")), name),
+        ("Video", (video, fbx_text(b"skin\0\1Video")), name),
+    ]
+    file.record("Objects", children=objects)
+    file.record("Connections", children=[("C", link, ()) for link in links])
+    return file.whole()
+
+
+@pytest.mark.parametrize("uses", [["DiffuseColor"], ["NormalMap", "TransparencyFactor"], []])
+def test_a_missing_texture_refuses(uses: list[str], tmp_path: Path) -> None:
+    """Blender would draw that head as plain skin."""
+    (tmp_path / "head.fbx").write_bytes(linked_fbx(*uses))
+    [head] = find_heads(tmp_path / "head.fbx").heads
+    assert "'gone.png' is missing" in head.problems[0]
+    with pytest.raises(HeadError, match=r"the texture 'gone\.png' is missing; put it into"):
+        read_mesh(head, tmp_path, import_with_blender=lambda *_: pytest.fail("it was imported"))
+
+
+def test_a_missing_texture_that_is_not_drawn_does_not(tmp_path: Path) -> None:
+    (tmp_path / "head.fbx").write_bytes(linked_fbx("NormalMap", "SpecularFactor"))
+    assert check_fbx(tmp_path / "head.fbx") == ()
 
 
 def test_an_embedded_texture_may_have_any_name(tmp_path: Path) -> None:

@@ -189,6 +189,22 @@ def test_rays_go_through_holes(tmp_path: Path) -> None:
         Surface(mesh)
 
 
+@pytest.mark.parametrize(("wrap", "holes"), [("extend", "x..."), ("repeat", "x.x."), ("mirror", "x..x")])
+def test_holes_lie_where_the_renderer_draws_them(tmp_path: Path, wrap: str, holes: str) -> None:
+    """The left half of a texture is cut out; it goes on over twice its width."""
+    alpha = np.full((8, 8, 4), 255, np.uint8)
+    alpha[:, :4, 3] = 0
+    cv2.imwrite(str(tmp_path / "t.png"), alpha)
+    square = np.array([[-50, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]], float)
+    order = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    uv = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], np.float32)[order]
+    material = Material("lashes", texture=tmp_path / "t.png", cutout=True, wrap=wrap)
+    surface = Surface(HeadMesh(square, order, uv, None, np.zeros(2, np.int32), (material,)))
+    origins = np.array([[x, 5.0, -400] for x in (-40, -15, 10, 35)])
+    found = surface.first_hits(origins, np.tile([0, 0, 1.0], (4, 1)))
+    assert "".join("x" if triangle < 0 else "." for triangle in found.triangles) == holes
+
+
 def test_levelling_undoes_a_turned_face() -> None:
     turned = rotation_from_angles(np.array([12.0, -8.0, 5.0]))
     points = 1.3 * FACE_MESH.surface_face() @ CAMERA_FROM_GRAPHICS @ turned.T + [1.0, 2.0, 3.0]

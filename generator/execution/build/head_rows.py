@@ -45,7 +45,7 @@ def head_row(planned: PlannedHead, mesh_path: str, topology: Topology) -> HeadRo
         vertices=planned.vertices,
         triangles=planned.triangles,
         split=planned.split,
-        problems=(*head.problems, *planned.problems, *placement.notes),
+        problems=tuple(dict.fromkeys((*head.problems, *planned.problems, *placement.notes))),
     )
 
 

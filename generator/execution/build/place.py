@@ -36,6 +36,7 @@ def place_heads(
     orders = place_orders(source, config)
     reporter.stage("placing heads", len(orders))
     planned: list[PlannedHead] = []
+    known: dict[str, list[str]] = {}
     hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
     for outcome in PlacedHeads(root, versions, hashes).outcomes(orders, executor):
         reporter.advance()
@@ -47,6 +48,8 @@ def place_heads(
                 skipped.append(SkippedHead(head.subject, head.expression, head.mesh_path, fact.error))
                 reporter.note(f"skipped {head.name}: {fact.error}")
                 continue
+            for text in dict.fromkeys((*head.problems, *fact.problems)):
+                known.setdefault(text, []).append(head.name)
             planned.append(
                 PlannedHead(
                     head=head,
@@ -65,6 +68,9 @@ def place_heads(
         if placed:
             for text in placed.placement.notes:
                 reporter.note(f"{heads[0].subject}: {text}")
+    for text, names in known.items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        reporter.note(f"{names[0]}{more}: {text}")
     if not planned:
         reason = f"; the first: {skipped[0].reason}" if skipped else ""
         raise HeadError(f"{source.path}: none of its heads can be built{reason}")

@@ -35,9 +35,9 @@ def render_preview(
 ) -> str:
     """Render the configured source's one subject at pose (yaw, pitch, roll) into picture.
 
-    Returns a line about what was found. Raises UsageError if the source holds
-    several subjects or the suffix is no image format, HeadError if the head
-    cannot be built, DatasetError if the picture cannot be written.
+    Returns a line about what was found and all that is known about the head. Raises UsageError if
+    the source holds several subjects or the suffix is no image format, HeadError if the head cannot
+    be built, DatasetError if the picture cannot be written.
     """
     if picture.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise UsageError(f"{picture}: the picture's name must end in .png or .jpg")
@@ -77,7 +77,8 @@ def render_preview(
         picture.write_bytes(encoded.tobytes())
     except OSError as error:
         raise DatasetError(f"{picture}: cannot be written ({error.strerror})") from error
-    notes = "; ".join(placement.notes)
+    left_out = (f"skipped {skip.subject}/{skip.expression}: {skip.reason}" for skip in source.skipped)
+    notes = "; ".join(dict.fromkeys((*head.problems, *mesh.problems, *placement.notes, *left_out)))
     return ("landmarks found" if found is not None else "no face was found at this pose") + (
         f" ({notes})" if notes else ""
     )
