@@ -22,6 +22,8 @@ from generator.errors import HeadturnError
 from generator.execution.build.folder import LOG_FILE
 from generator.messages import BuildOrder, LaneOrder
 
+pytestmark = pytest.mark.slow
+
 FLIPS = int(os.environ.get("HEADTURN_FLIPS", "24"))
 """Of each test; `make soak` asks for 200."""
 

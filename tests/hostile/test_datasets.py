@@ -19,6 +19,8 @@ from generator import cli
 from generator.cli.app import make_app
 from generator.registries import FORMATS
 
+pytestmark = pytest.mark.slow
+
 SAMPLE = "s1/neutral/y+0_p+0_r+0"
 
 
