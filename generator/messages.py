@@ -42,7 +42,7 @@ class RenderOrder:
 
 @dataclass(frozen=True)
 class ConvertOrder:
-    """Read an FBX file with Blender's importer and write it as GLB."""
+    """Read a mesh file with Blender's importer for its kind and write it as GLB."""
 
     source: str
     target: str

@@ -52,7 +52,7 @@ import bpy  # noqa: E402
 
 from generator.blender import compat  # noqa: E402
 from generator.blender.images import Images  # noqa: E402
-from generator.blender.importing import images_from  # noqa: E402
+from generator.blender.importing import export_glb, import_mesh  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
 from generator.messages import (  # noqa: E402
     ConvertOrder,
@@ -106,9 +106,8 @@ class RenderWorker:
     def _convert(self, order: ConvertOrder) -> None:
         self._loaded = None
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        with images_from(Path(order.source).parent):
-            bpy.ops.import_scene.fbx(filepath=order.source, use_anim=False)
-        bpy.ops.export_scene.gltf(filepath=order.target, export_format="GLB", export_animations=False)
+        import_mesh(Path(order.source))
+        export_glb(Path(order.target))
 
 
 def main(threads: int) -> None:

@@ -17,8 +17,15 @@ from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key
 from generator.heads.ply import ply_textures
 
-SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".fbx")
+SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".vrm", ".fbx", ".stl")
 """Where one head comes in several formats, the first of these is read."""
+
+UNREAD = {
+    **dict.fromkeys((".dae", ".usd", ".usda", ".usdc", ".usdz", ".blend", ".abc", ".x3d"), "in Blender"),
+    **dict.fromkeys((".3ds", ".wrl", ".max", ".ma", ".mb", ".c4d"), "in the program that wrote it"),
+}
+"""Other formats of meshes, and where such a file is opened. Some name further files, anywhere: Blender, whose
+importers could read them, would open what they name."""
 
 MAX_DEPTH = 3
 
@@ -65,6 +72,8 @@ def find_meshes(path: Path) -> tuple[list[Head], list[SkippedHead]]:
     if path.is_file():
         if path.suffix.lower() in SUFFIXES:
             found.add(path.stem, NEUTRAL, path, plain)
+        elif path.suffix.lower() in UNREAD:
+            found.skip(path.stem, NEUTRAL, path, _unread(path.name))
         return list(found.heads.values()), found.skipped
     folders = _mesh_folders(path)
     common = Counter(folder.name for folder, _ in folders)
@@ -77,6 +86,11 @@ def find_meshes(path: Path) -> tuple[list[Head], list[SkippedHead]]:
             continue
         meshes = [name for name in names if Path(name).suffix.lower() in SUFFIXES]
         stems = {Path(name).stem for name in meshes}
+        for name in sorted(names, key=natural_key):
+            if Path(name).suffix.lower() in UNREAD and Path(name).stem not in stems:
+                found.skip(
+                    Path(name).stem if folder == path else subject, NEUTRAL, folder / name, _unread(name)
+                )
         for name in sorted(meshes, key=_by_stem_then_format):
             stem = Path(name).stem
             if len(stems) == 1:
@@ -86,6 +100,11 @@ def find_meshes(path: Path) -> tuple[list[Head], list[SkippedHead]]:
             else:
                 found.add(subject, stem, folder / name, plain)
     return list(found.heads.values()), found.skipped
+
+
+def _unread(name: str) -> str:
+    suffix = Path(name).suffix.lower()
+    return f"{suffix[1:].upper()} is not read; open the file {UNREAD[suffix]} and export it as GLB"
 
 
 def _by_stem_then_format(name: str) -> tuple[object, ...]:
@@ -109,7 +128,7 @@ def _mesh_folders(path: Path) -> list[tuple[Path, list[str]]]:
             continue
         entries = [entry for entry in entries if not entry.name.startswith(".")]
         names = [entry.name for entry in entries if not entry.is_dir()]
-        if CARD_NAME in names or any(Path(name).suffix.lower() in SUFFIXES for name in names):
+        if CARD_NAME in names or any(Path(name).suffix.lower() in (*SUFFIXES, *UNREAD) for name in names):
             found.append((folder, names))
         if depth < MAX_DEPTH and CARD_NAME not in names:
             stack += [(Path(entry.path), depth + 1) for entry in entries if entry.is_dir()]

@@ -1,36 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""glTF 2.0 (.glb and .gltf): geometry through trimesh, materials read here.
+"""glTF 2.0 (.glb and .gltf): its materials, and all of it as one mesh.
 
-trimesh turns a missing or broken texture into a log line and opens every image
-the file names. So the JSON is read first: textures are checked and taken out,
-each material is replaced by its number, and trimesh only gets geometry.
+Not through trimesh, which turns a missing or broken texture into a log line and opens every image the
+file names.
 """
 
 from __future__ import annotations
 
-import io
-import json
 import struct
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-import trimesh
-from trimesh.resolvers import Resolver
-from trimesh.visual import TextureVisuals
 
 from generator.errors import HeadError
 from generator.escape import quoted
-from generator.heads.gltf_file import BIN, FLOAT, JSON, MAGIC, check_header, split_gltf, uri_bytes
-from generator.heads.limits import (
-    MAX_GEOMETRY_BYTES,
-    MAX_TRIANGLES,
-    MAX_VERTICES,
-    check_count,
-    read_mesh_bytes,
-)
+from generator.heads.gltf_accessors import Accessors
+from generator.heads.gltf_draco import is_packed, unpack
+from generator.heads.gltf_file import check_header, image_number, split_gltf, uri_bytes
+from generator.heads.gltf_scene import Piece, read_pieces
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.obj import SEE_THROUGH, SKIN
 from generator.heads.paths import find_inside
@@ -38,59 +29,45 @@ from generator.heads.textures import Textures, open_image
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 
 # Anything in the JSON may be missing or of another kind than the standard says.
-# Of trimesh, too: where it has no value for a variable, that is a NameError.
-_MALFORMED = (
-    *(LookupError, TypeError, AttributeError, ValueError, AssertionError, RecursionError),
-    *(NameError, ArithmeticError, NotImplementedError, struct.error),
-)
+_MALFORMED = (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, struct.error)
 _WRAPS = {33071: EXTEND, 33648: MIRROR, 10497: REPEAT}
 WHITE = 1 - 0.5 / 255
 """Vertex colours are drawn with eight bits: from here on they are 1."""
 _UNTRANSFORMED = {"offset": [0, 0], "scale": [1, 1], "rotation": 0}
 
 
-class _Folder(Resolver):
-    """What trimesh asks for a file by name; answers from the head's folder only."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def get(self, key: str) -> bytes:
-        return read_mesh_bytes(find_inside(self.folder, unquote(key), "buffer"), MAX_GEOMETRY_BYTES)
-
-    def keys(self) -> list[str]:
-        return []
-
-    def write(self, name: str, data: bytes) -> None:
-        raise NotImplementedError("heads are only read")
-
-    def namespaced(self, namespace: str) -> Resolver:
-        raise NotImplementedError("heads have no namespaces")
-
-
 @dataclass(frozen=True)
 class _Source:
-    """A glTF material. color: sRGB, None if not given. factor: the same, linear. mode: alphaMode.
-    wraps: how the texture goes on along u and v. note: what of it is not drawn."""
+    """A glTF material. color: sRGB, None if not given. factor: the same, linear.
+
+    mode: alphaMode. cutoff: what MASK shows has at least this alpha. transmission: 0-1 of the light that
+    passes; where, the red of transmission_map says. wraps: how the
+    texture goes on along u and v. note: what of it is not drawn.
+    """
 
     name: str
     color: tuple[float, float, float] | None = None
     factor: np.ndarray = field(default_factory=lambda: np.ones(3))
     opacity: float = 1.0
     mode: str = "OPAQUE"
+    cutoff: float = 0.5
+    transmission: float = 0.0
+    transmission_map: Path | None = None
     texture: Path | None = None
     wraps: tuple[str, str] = (REPEAT, REPEAT)
     note: str = ""
 
 
-def read_gltf(path: Path, scratch: Path) -> HeadMesh:
+def read_gltf(
+    path: Path, scratch: Path, import_with_blender: Callable[[Path, Path], Path] | None = None
+) -> HeadMesh:
     """All triangles of a glTF scene in its world frame, with their materials.
 
-    scratch: embedded images are written there, byte for byte.
+    scratch: embedded images are written there, byte for byte. import_with_blender: unpacks Draco.
 
     Raises
     ------
-    HeadError: the file cannot be parsed, is compressed, or a texture is
+    HeadError: the file cannot be parsed or unpacked, or a texture is
         missing, outside of the folder or not an image.
     """
     try:
@@ -98,7 +75,11 @@ def read_gltf(path: Path, scratch: Path) -> HeadMesh:
         check_header(header)
         textures = Textures()
         materials = _materials(header, binary, path, scratch, textures)
-        return _assemble(_load_geometry(header, binary, _Folder(path.parent)), materials, textures)
+        accessors = Accessors(header, binary, path.parent)
+        if is_packed(header):
+            header, binary = unpack(header, accessors, scratch, import_with_blender)
+            accessors = Accessors(header, binary, scratch)
+        return _assemble(read_pieces(header, accessors), materials, textures)
     except _MALFORMED as error:
         what = f"{type(error).__name__}: {error}"
         raise HeadError(
@@ -111,27 +92,29 @@ def _materials(
 ) -> list[_Source]:
     """The materials of the file, then the one of primitives that name none."""
     images: dict[int | str, Path] = {}
+
+    def texture_of(reference: dict[str, Any] | None) -> Path | None:
+        if reference is None:
+            return None
+        transform = reference.get("extensions", {}).get("KHR_texture_transform", {})
+        moved = any(transform.get(key, same) != same for key, same in _UNTRANSFORMED.items())
+        if moved or transform.get("texCoord", reference.get("texCoord", 0)) != 0:
+            raise HeadError("a texture uses a second or transformed set of coordinates; bake them")
+        number = image_number(header["textures"][reference["index"]])
+        image = header["images"][number]
+        # Many images of a file may share their bytes.
+        content: int | str = image["bufferView"] if "bufferView" in image else image["uri"]
+        if content not in images:
+            images[content] = _image(header, binary, number, path, scratch)
+            textures.check(images[content])
+        return images[content]
+
     result = []
     for index, material in enumerate(header.get("materials", [])):
         color, reference = _base_color(material)
         factor = [float(x) for x in color or (1, 1, 1, 1)]
-        texture, wraps = None, _Source.wraps
-        if reference is not None:
-            transform = reference.get("extensions", {}).get("KHR_texture_transform", {})
-            moved = any(transform.get(key, same) != same for key, same in _UNTRANSFORMED.items())
-            if moved or reference.get("texCoord", 0) != 0:
-                raise HeadError("a texture uses a second or transformed set of coordinates; bake them")
-            entry = header["textures"][reference["index"]]
-            sampler = header["samplers"][entry["sampler"]] if "sampler" in entry else {}
-            wraps = (_WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)])
-            number = entry["source"]
-            image = header["images"][number]
-            # Many images of a file may share their bytes.
-            content: int | str = image["bufferView"] if "bufferView" in image else image["uri"]
-            if content not in images:
-                images[content] = _image(header, binary, number, path, scratch)
-                textures.check(images[content])
-            texture = images[content]
+        texture, wraps = texture_of(reference), _wraps(header, reference)
+        clear = material.get("extensions", {}).get("KHR_materials_transmission", {})
         red, green, blue = (float(x) for x in _srgb(np.array(factor[:3])))
         name = str(material.get("name", f"material{index}"))
         unseen = texture is None and "emissiveTexture" in material
@@ -142,12 +125,22 @@ def _materials(
                 factor=np.array(factor[:3]),
                 opacity=factor[3],
                 mode=str(material.get("alphaMode", "OPAQUE")),
+                cutoff=float(material.get("alphaCutoff", 0.5)),
+                transmission=float(clear.get("transmissionFactor", 0)),
+                transmission_map=texture_of(clear.get("transmissionTexture")),
                 texture=texture,
                 wraps=wraps,
                 note=f"the emissive texture of {quoted(name)} is not drawn" if unseen else "",
             )
         )
     return [*result, _Source("skin")]
+
+
+def _wraps(header: dict[str, Any], reference: dict[str, Any] | None) -> tuple[str, str]:
+    """How a texture goes on along u and v."""
+    texture = {} if reference is None else header["textures"][reference["index"]]
+    sampler = header["samplers"][texture["sampler"]] if "sampler" in texture else {}
+    return _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
 
 
 def _base_color(material: dict[str, Any]) -> tuple[Any, Any]:
@@ -179,74 +172,30 @@ def _image(header: dict[str, Any], binary: bytes, number: int, path: Path, scrat
     return texture.rename(texture.with_name(texture.name + suffix))
 
 
-def _load_geometry(header: dict[str, Any], binary: bytes, folder: _Folder) -> trimesh.Scene:
-    none = len(header.get("materials", []))
-    dropped = {"images", "textures", "samplers", "animations", "extensions"}
-    bare = {key: value for key, value in header.items() if key not in dropped}
-    bare["materials"] = [{"name": str(i)} for i in range(none + 1)]
-    bare["meshes"] = [
-        {**mesh, "primitives": [_bare_primitive(p, none, header) for p in mesh["primitives"]]}
-        for mesh in header.get("meshes", [])
-    ]
-    text = json.dumps(bare).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<2I", len(text), JSON) + text
-    if binary:
-        binary += b"\0" * (-len(binary) % 4)
-        chunks += struct.pack("<2I", len(binary), BIN) + binary
-    data = io.BytesIO(struct.pack("<3I", MAGIC, 2, 12 + len(chunks)) + chunks)
-    scene = trimesh.load_scene(data, file_type="glb", resolver=folder, process=False)
-    if not scene.graph.nodes_geometry:
-        raise HeadError("the file has no meshes")
-    return scene
-
-
-def _bare_primitive(primitive: dict[str, Any], none: int, header: dict[str, Any]) -> dict[str, Any]:
-    if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-        raise HeadError("the mesh is Draco-compressed; export it without compression")
-    uv = primitive["attributes"].get("TEXCOORD_0")
-    if uv is not None and header["accessors"][uv]["componentType"] != FLOAT:
-        raise HeadError("the texture coordinates are stored as integers; export them as floats")
-    return {**primitive, "material": primitive.get("material", none)}
-
-
-def _assemble(scene: trimesh.Scene, sources: list[_Source], textures: Textures) -> HeadMesh:
+def _assemble(pieces: Iterable[Piece], sources: list[_Source], textures: Textures) -> HeadMesh:
     vertices, triangles, uvs, colors, index = [], [], [], [], []
     used: dict[int, int] = {}
     tinted: set[int] = set()
-    problems, offset, count, colored = [], 0, 0, False
-    for node in scene.graph.nodes_geometry:
-        matrix, name = scene.graph[node]
-        mesh = scene.geometry[name]
-        if not isinstance(mesh, trimesh.Trimesh) or not isinstance(mesh.visual, TextureVisuals):
-            continue  # lines and points
-        number = int(mesh.visual.material.name)
-        source = sources[number]
-        if source.mode == "BLEND" and source.opacity < SEE_THROUGH and source.texture is None:
+    problems, offset, colored = [], 0, False
+    for piece in pieces:
+        number = len(sources) - 1 if piece.material is None else piece.material
+        source, faces = sources[number], piece.triangles
+        if piece.uv is None and source.texture:
+            raise HeadError(f"the textured material {quoted(source.name)} has no texture coordinates")
+        corner_uv = np.zeros((len(faces), 3, 2), np.float32) if piece.uv is None else piece.uv[faces]
+        if _is_clear(source, corner_uv, piece.color, textures):
             problems.append(f"the see-through material {quoted(source.name)} is left out")
             continue
-        faces = np.asarray(mesh.faces)
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        offset += len(mesh.vertices)
-        count += len(faces)
-        check_count(offset, MAX_VERTICES, "vertices")
-        check_count(count, MAX_TRIANGLES, "triangles")
-        if len(faces) and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
-            raise HeadError(f"a face uses a vertex beyond {len(mesh.vertices) - 1}; export the mesh again")
-        vertices.append(np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3])
-        triangles.append(faces + offset - len(mesh.vertices))
-        uv = mesh.visual.uv
-        if uv is None and source.texture:
-            raise HeadError(f"the textured material {quoted(source.name)} has no texture coordinates")
-        uvs.append(np.zeros((len(faces), 3, 2), np.float32) if uv is None else np.asarray(uv)[faces])
-        color = mesh.visual.vertex_attributes.get("color")
-        colored |= color is not None
+        vertices.append(piece.vertices)
+        triangles.append(faces + offset)
+        offset += len(piece.vertices)
+        uvs.append(corner_uv)
+        colored |= piece.color is not None
         if source.note:
             problems.append(source.note)
-        if color is None and source.color is None and source.texture is None:
+        if piece.color is None and source.color is None and source.texture is None:
             problems.append(f"no texture or colour for {quoted(source.name)}; drawn as plain skin")
-        colors.append(_vertex_colors(color, source, len(mesh.vertices)))
+        colors.append(_vertex_colors(piece.color, source, len(piece.vertices)))
         if source.texture and (colors[-1] < WHITE).any():
             tinted.add(number)
         index.append(np.full(len(faces), used.setdefault(number, len(used)), dtype=np.int32))
@@ -273,6 +222,23 @@ def _assemble(scene: trimesh.Scene, sources: list[_Source], textures: Textures) 
     )
 
 
+def _is_clear(source: _Source, uv: np.ndarray, color: np.ndarray | None, textures: Textures) -> bool:
+    """Is it a shell that a viewer looks through, such as a cornea or a film of tears?"""
+    passes = source.transmission
+    if passes > SEE_THROUGH and source.transmission_map:
+        passes *= textures.mean_red(source.transmission_map, uv, source.wraps)
+    if passes > SEE_THROUGH:
+        return True
+    if source.mode not in ("BLEND", "MASK"):
+        return False
+    opacity = source.opacity
+    if source.texture:
+        opacity *= textures.peak_alpha(source.texture, uv, source.wraps)
+    if color is not None and color.shape[1:] == (4,) and len(color):
+        opacity *= float(_fractions(color[:, 3]).max())
+    return opacity < (source.cutoff if source.mode == "MASK" else SEE_THROUGH)
+
+
 def _material(
     source: _Source, tinted: bool, uv: np.ndarray, textures: Textures
 ) -> tuple[Material, np.ndarray, list[str]]:
@@ -293,10 +259,12 @@ def _vertex_colors(values: np.ndarray | None, source: _Source, count: int) -> np
     if values is None:
         plain = 1.0 if source.texture else source.color or SKIN
         return np.full((count, 3), plain, dtype=np.float32)
-    color = np.asarray(values)[:, :3]
-    if np.issubdtype(color.dtype, np.integer):
-        color = color / np.iinfo(color.dtype).max
+    color = _fractions(values[:, :3])
     return _srgb(color if source.texture else color * source.factor)
+
+
+def _fractions(values: np.ndarray) -> np.ndarray:
+    return values / np.iinfo(values.dtype).max if np.issubdtype(values.dtype, np.integer) else values
 
 
 def _srgb(linear: np.ndarray) -> np.ndarray:

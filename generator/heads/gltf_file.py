@@ -26,9 +26,13 @@ from generator.reading import parse_json
 MAX_JSON_VALUES = 2_000_000
 """A JSON takes about a hundred bytes of memory a value."""
 MAGIC, JSON, BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-FLOAT = 5126
-_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, FLOAT: 4}
-_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_KNOWN = (
+    *("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "EXT_texture_webp"),
+    *("KHR_lights_punctual", "KHR_node_visibility", "KHR_draco_mesh_compression", "VRM"),
+)
+"""How the names of extensions begin that are read, or that change nothing of a mesh and its colours."""
 
 
 def split_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -65,7 +69,7 @@ def split_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
 def check_header(header: dict[str, Any]) -> None:
     """Raises HeadError: it needs an extension, or claims more than a head may have. As the kinds of its
     values are anybody's, also LookupError, TypeError, AttributeError or ValueError."""
-    unknown = [e for e in header.get("extensionsRequired", []) if not str(e).startswith("KHR_materials_")]
+    unknown = [e for e in header.get("extensionsRequired", []) if not str(e).startswith(_KNOWN)]
     if unknown:
         raise HeadError(f"the file needs {quoted(', '.join(map(str, unknown)))}; export it without")
     nodes = header.get("nodes", [])
@@ -83,7 +87,7 @@ def _check_sizes(header: dict[str, Any]) -> None:
     for accessor in header.get("accessors", []):
         if accessor["count"] < 0:
             raise HeadError("the file claims a negative number of elements; export it again")
-        size += int(accessor["count"]) * _COMPONENTS[accessor["type"]] * _SIZES[accessor["componentType"]]
+        size += int(accessor["count"]) * COMPONENTS[accessor["type"]] * _SIZES[accessor["componentType"]]
     if size > MAX_GEOMETRY_BYTES:
         raise HeadError(f"the file claims {size:,} bytes of geometry; {MAX_GEOMETRY_BYTES:,} is the limit")
 
@@ -103,6 +107,17 @@ def _check_tree(nodes: list[dict[str, Any]]) -> None:
                 raise HeadError(
                     f"the node tree of the file is not a tree, or deeper than {MAX_DEPTH}; export it again"
                 )
+
+
+def image_number(texture: dict[str, Any]) -> int:
+    """The image of a texture. Raises HeadError: only one of a kind that is not read."""
+    extensions = texture.get("extensions", {})
+    if "EXT_texture_webp" in extensions:
+        return int(extensions["EXT_texture_webp"]["source"])
+    if "source" in texture:
+        return int(texture["source"])
+    names = ", ".join(map(str, extensions)) or "no image"
+    raise HeadError(f"a texture is stored as {quoted(names)}; export it with PNG, JPEG or WebP images")
 
 
 def uri_bytes(uri: str, folder: Path) -> bytes:

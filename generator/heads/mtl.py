@@ -16,6 +16,7 @@ from pathlib import Path
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.encodings import local_text
 from generator.heads.limits import MAX_MATERIALS, check_count, read_mesh_bytes
 from generator.heads.paths import MissingFile, find_inside
 from generator.heads.textures import IMAGE_SUFFIXES
@@ -49,11 +50,11 @@ class MtlMaterial:
 
 
 def decode(data: bytes) -> str:
-    """Text of an OBJ or MTL file: UTF-8, else Latin-1, with plain newlines and continued lines joined."""
+    """Text of an OBJ or MTL file: UTF-8 or another encoding, plain newlines, continued lines joined."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")
+        text = local_text(data)
     return text.replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
 
 

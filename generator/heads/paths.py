@@ -15,9 +15,12 @@ from pathlib import Path
 
 from generator.errors import HeadError
 from generator.escape import quoted
+from generator.heads.encodings import is_spelled, spellings
 from generator.names import name_problem
 
 _DRIVE = re.compile(r"^[A-Za-z]:")
+_LONGEST_END = 4
+"""Of an absolute name, in parts."""
 _NUMBER = re.compile(r"(\d+)")
 
 
@@ -47,20 +50,20 @@ def natural_key(text: str) -> tuple[tuple[int, int, str], ...]:
 def find_inside(folder: Path, name: str, what: str) -> Path:
     """The file called ``name`` in ``folder`` or below it.
 
-    Backslashes count as slashes, and upper and lower case are the same where
-    no exact match exists: material files are mostly written on Windows.
+    Backslashes count as slashes, and upper and lower case, and the ways to write one character, are the same
+    where no exact match exists: material files are mostly written on Windows. So are absolute names, of which
+    the end is looked for here.
 
     Raises
     ------
     MissingFile: there is no such file.
-    HeadError: the name is absolute, or leaves the folder (also through a link).
+    HeadError: the name is absolute and its end not here, or it leaves the folder (also through a link).
     """
     slashed = name.strip().replace("\\", "/")
     if not slashed or any(unicodedata.category(c) == "Cc" for c in slashed):
         raise HeadError(f"the {what} has the name {quoted(name)}; write a file name there")
     if slashed.startswith("/") or _DRIVE.match(slashed):
-        raise HeadError(f"the {what} {quoted(name)} is an absolute path; put the file beside the mesh "
-                        "and write only its name")  # fmt: skip
+        return _find_end(folder, slashed, what)
     parts = posixpath.normpath(slashed).split("/")
     if parts[0] == "..":
         raise HeadError(f"the {what} {quoted(name)} lies outside of the head's folder; put it inside")
@@ -73,6 +76,19 @@ def find_inside(folder: Path, name: str, what: str) -> Path:
     if not real.is_file():
         raise HeadError(f"the {what} {found} is not a file")
     return found
+
+
+def _find_end(folder: Path, name: str, what: str) -> Path:
+    """The file in folder with as much of the end of an absolute name as there is one for."""
+    parts = [part for part in _DRIVE.sub("", name).split("/") if part]
+    for start in range(max(0, len(parts) - _LONGEST_END), len(parts)):
+        try:
+            return find_inside(folder, "/".join(parts[start:]), what)
+        except MissingFile:
+            continue
+    raise HeadError(
+        f"the {what} {quoted(name)} is an absolute path; put the file beside the mesh and write only its name"
+    )
 
 
 def find_below(folder: Path, name: str, what: str) -> Path:
@@ -95,8 +111,9 @@ def _child(folder: Path, part: str, name: str, what: str) -> Path:
         exact = folder / part
         if exact.exists() or exact.is_symlink():
             return exact
+        wanted = spellings(part)
         for other in sorted(folder.iterdir()):
-            if other.name.casefold() == part.casefold():
+            if is_spelled(other.name, wanted):
                 return other
     except OSError as error:
         raise HeadError(f"cannot look for the {what} {quoted(name)} in {folder}: {error.strerror}") from error

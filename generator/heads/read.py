@@ -16,10 +16,11 @@ from generator.heads.limits import check_mesh_file
 from generator.heads.mesh import HeadMesh
 from generator.heads.obj import read_obj
 from generator.heads.ply import read_ply
+from generator.heads.stl import read_stl
 from generator.heads.weld import weld
 
 ImportWithBlender = Callable[[Path, Path], Path]
-"""(FBX file, scratch folder) -> the GLB that Blender made of it."""
+"""(mesh file, scratch folder) -> the GLB that Blender made of it."""
 
 
 def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlender | None = None) -> HeadMesh:
@@ -31,7 +32,7 @@ def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlend
     ----------
     scratch: an existing folder of this head alone; textures that the mesh
         embeds or that are made for it are written there.
-    import_with_blender: converts FBX; None where no Blender can be run.
+    import_with_blender: converts FBX and Draco; None where no Blender can be run.
 
     Raises
     ------
@@ -55,13 +56,15 @@ def _read(path: Path, scratch: Path, import_with_blender: ImportWithBlender | No
         case ".obj":
             return read_obj(path, scratch)
         case ".ply":
-            return read_ply(path)
-        case ".glb" | ".gltf":
-            return read_gltf(path, scratch)
+            return read_ply(path, scratch)
+        case ".glb" | ".gltf" | ".vrm":
+            return read_gltf(path, scratch, import_with_blender)
         case ".fbx":
             if import_with_blender is None:
                 raise HeadError("FBX is read by Blender, which is not available here; convert it to GLB")
             if missing := check_fbx(path):
                 raise HeadError(missing[0])
             return read_gltf(import_with_blender(path, scratch), scratch)
+        case ".stl":
+            return read_stl(path)
     raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB or FBX")

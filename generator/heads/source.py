@@ -17,6 +17,8 @@ from generator.heads.head import Finder, Head, HeadSource, SkippedHead
 from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
 from generator.names import is_text
 
+_ARCHIVES = (".zip", ".7z", ".rar", ".gz", ".tgz", ".tar")
+
 
 def find_heads(
     path: Path,
@@ -133,6 +135,8 @@ def _search(path: Path) -> tuple[str, Finder, list[Head], list[SkippedHead]]:
 
 
 def _nothing_found(path: Path) -> str:
+    if path.suffix.lower() in _ARCHIVES and path.is_file():
+        return f"{path} is an archive: unpack it, and name the folder"
     archives = sorted(path.glob("*.zip")) if path.is_dir() else []
     if archives:
         return f"no heads in {path}, but {archives[0].name}: unzip it first"

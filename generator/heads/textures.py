@@ -68,13 +68,25 @@ def open_image(path: Path) -> Iterator[Image.Image]:
                 if image.width * image.height > MAX_TEXTURE_PIXELS:
                     size = f"{image.width} x {image.height}"
                     raise HeadError(f"the texture {path} has too many pixels ({size}); make it smaller")
+                if image.mode == "F":
+                    raise HeadError(f"the texture {path} is made of floating-point numbers; save it as PNG")
                 yield image
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise HeadError(f"the texture {path} has too many pixels ({error}); make it smaller") from error
     except UnidentifiedImageError as error:
+        if _is_tiff(path):
+            raise HeadError(
+                f"the texture {path} is a TIFF of a kind that is not read, such as one of floating-point "
+                "numbers; save it as PNG"
+            ) from error
         raise HeadError(f"the texture {path} is not an image ({', '.join(FORMATS)} expected)") from error
     except _BROKEN as error:
         raise HeadError(f"the texture {path} is broken ({_line(error)}); replace it") from error
+
+
+def _is_tiff(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(4) in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
 def _line(error: Exception) -> str:
@@ -147,10 +159,26 @@ class Textures:
                 f"a texture coordinate of {path.name} is not a finite number; export the mesh again"
             )
         alpha = self._alpha_of(path)
-        return alpha is not None and len(uv) > 0 and _holes(alpha, uv, wrap)
+        if alpha is None or alpha.max() < OPAQUE or len(uv) == 0:
+            return False
+        return float((_samples(alpha, uv, wrap) < OPAQUE).mean()) > HOLES
+
+    def peak_alpha(self, path: Path, uv: np.ndarray, wraps: tuple[str, str]) -> float:
+        """The most, 0-1, that an image's alpha is where triangles use it; 1 without alpha."""
+        alpha = self._alpha_of(path)
+        if alpha is None or len(uv) == 0:
+            return 1.0
+        return float(_samples(alpha, *bring_back(uv, wraps)).max()) / 255
+
+    def mean_red(self, path: Path, uv: np.ndarray, wraps: tuple[str, str]) -> float:
+        """How red, 0-1, an image is where triangles use it."""
+        self.check(path)
+        with open_image(path) as image:
+            red = np.asarray(image.convert("RGB").getchannel("R"))
+        return float(_samples(red, *bring_back(uv, wraps)).mean()) / 255 if len(uv) else 1.0
 
     def _alpha_of(self, path: Path) -> np.ndarray | None:
-        """uint8 [H, W], None of an image that is solid or transparent throughout."""
+        """uint8 [H, W], None of an image that is solid throughout."""
         if path not in self._alpha:
             with open_image(path) as image:
                 self._pixels += image.width * image.height
@@ -206,10 +234,11 @@ def _alpha(image: Image.Image) -> np.ndarray | None:
         image.load()
         return None
     alpha = np.asarray(image.convert("RGBA").getchannel("A"))
-    return None if alpha.min() >= OPAQUE or alpha.max() < OPAQUE else alpha
+    return None if alpha.min() == 255 else alpha
 
 
-def _holes(alpha: np.ndarray, uv: np.ndarray, wrap: str) -> bool:
+def _samples(channel: np.ndarray, uv: np.ndarray, wrap: str) -> np.ndarray:
+    """Values of uint8 [H, W] where triangles, float [T, 3, 2], T > 0, use it."""
     side = int(np.clip(np.sqrt(_SAMPLES / len(uv)), 3, 64))
     # Cell centres of a barycentric grid: all inside, so that the border of an atlas island does not count.
     a, b = (grid.ravel() for grid in np.mgrid[0:side, 0:side])
@@ -217,7 +246,7 @@ def _holes(alpha: np.ndarray, uv: np.ndarray, wrap: str) -> bool:
     weights = (np.stack([a, b], axis=1)[inside] + 1 / 3) / side
     weights = np.column_stack([weights, 1 - weights.sum(1)])
     points = np.einsum("kc,tcd->tkd", weights, uv)
-    return float((alpha[texels(points, wrap, alpha.shape)] < OPAQUE).mean()) > HOLES
+    return channel[texels(points, wrap, channel.shape)]
 
 
 def combine_alpha(color: Path, opacity: Path, target: Path) -> None:

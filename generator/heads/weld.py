@@ -13,6 +13,8 @@ from generator.heads.mesh import HeadMesh
 MAX_COORDINATE = 1e7
 """A head in micrometres measures 3e5; beyond this 32-bit renderers lose the shape."""
 
+_AT_ONCE = 1 << 16
+
 
 def weld(mesh: HeadMesh) -> HeadMesh:
     """The mesh with one vertex per position, in order of first appearance.
@@ -39,10 +41,8 @@ def weld(mesh: HeadMesh) -> HeadMesh:
     triangles = new_index[representative[mesh.triangles]]
     a, b, c = triangles.T
     real = (a != b) & (b != c) & (c != a)
-    p, q, r = np.moveaxis(vertices[kept][triangles[real]], 1, 0)
-    doubled_area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
     size = np.ptp(vertices[kept], axis=0).max()
-    if not doubled_area.sum() > 1e-9 * size**2:
+    if not _has_area(vertices[kept], triangles[real], 1e-9 * size**2):
         raise HeadError("no triangle has an area; export the mesh again")
     return replace(
         mesh,
@@ -52,3 +52,14 @@ def weld(mesh: HeadMesh) -> HeadMesh:
         vertex_colors=None if mesh.vertex_colors is None else mesh.vertex_colors[kept],
         material_index=mesh.material_index[real],
     )
+
+
+def _has_area(vertices: np.ndarray, triangles: np.ndarray, least: float) -> bool:
+    """Is twice the area of all triangles more than that? Millions of them are not looked at all at once."""
+    total = 0.0
+    for start in range(0, len(triangles), _AT_ONCE):
+        p, q, r = np.moveaxis(vertices[triangles[start : start + _AT_ONCE]], 1, 0)
+        total += float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
+        if total > least:
+            return True
+    return False

@@ -141,6 +141,11 @@ def head_seeds() -> Iterator[tuple[str, bytes]]:
         + binary
         + struct.pack("<B4i", 4, 0, 1, 2, 3),
     )
+    strip = header.replace("element face", "element tristrips").replace("uchar int", "int int")
+    yield "ply", f"ply\nformat ascii 1.0\n{strip}{square}6 0 1 2 -1 3 2\n".encode()
+    facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    yield "stl", f"solid head\n{facet}endsolid head\n".encode()
+    yield "stl", bytes(80) + struct.pack("<I12fH", 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
     yield (
         "facescape",
         b"1_neutral.obj\n1_neutral.jpg\n2_smile.obj\n2_smile.obj.mtl\0newmtl a\nmap_Kd 1_neutral.jpg\n",

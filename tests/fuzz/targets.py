@@ -360,7 +360,9 @@ def texture(data: bytes) -> None:
 
 
 @target(
-    weight=3, words='"POSITION" "byteStride" "sparse" "componentType" "matrix" "KHR_texture_transform" "uri"'
+    weight=3,
+    words='"POSITION" "byteStride" "sparse" "componentType" "matrix" "KHR_texture_transform" "uri" '
+    '"skin" "joints" "JOINTS_0" "WEIGHTS_0" "inverseBindMatrices" "targets" "weights" "mode" "normalized"',
 )
 def gltf(data: bytes) -> None:
     """glTF as text."""
@@ -374,7 +376,8 @@ def glb(data: bytes) -> None:
 
 
 _PLY_WORDS = (
-    "ply format ascii binary_little_endian 1.0 element vertex face property list uchar int float end_header"
+    "ply format ascii binary_little_endian 1.0 element vertex face property list uchar int float tristrips "
+    "red end_header"
 )
 
 
@@ -382,6 +385,12 @@ _PLY_WORDS = (
 def ply(data: bytes) -> None:
     """PLY."""
     _read_heads(folder_with(head__ply=data))
+
+
+@target(words="solid facet normal outer loop vertex endloop endfacet endsolid")
+def stl(data: bytes) -> None:
+    """STL."""
+    _read_heads(folder_with(head__stl=data))
 
 
 @target(words="1_neutral.obj 2_smile.obj 1_neutral.jpg 1_neutral.obj.mtl .obj ..")

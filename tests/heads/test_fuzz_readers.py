@@ -128,10 +128,10 @@ def test_mtl(content: bytes) -> None:
 @given(PLY_HEADERS, st.binary(max_size=120), st.lists(st.lists(NUMBERS, max_size=5), max_size=8))
 def test_ply(header: list[str], binary: bytes, rows: list[list[str]]) -> None:
     text = "\n".join(["ply", *header, "end_header", *(" ".join(row) for row in rows)])
-    read(read_ply, "head.ply", text.encode() + b"\n" + binary)
+    read(lambda path: read_ply(path, path.parent), "head.ply", text.encode() + b"\n" + binary)
 
 
 @fuzz
 @given(st.binary(max_size=200))
 def test_ply_of_any_bytes(content: bytes) -> None:
-    read(read_ply, "head.ply", b"ply\n" + content)
+    read(lambda path: read_ply(path, path.parent), "head.ply", b"ply\n" + content)

@@ -45,7 +45,8 @@ def _mtl(map_kd: str) -> Callable[[Path], None]:
 
 
 def _absolute(folder: Path) -> None:
-    textured_obj(folder, str(folder / "skin.png"))
+    Image.new("RGB", (8, 8)).save(folder.parent / "outside.png")
+    textured_obj(folder, str(folder.parent / "outside.png"))
 
 
 def _link(folder: Path) -> None:
@@ -65,6 +66,17 @@ def _image(data: bytes) -> Callable[[Path], None]:
 def _image_bomb(folder: Path) -> None:
     textured_obj(folder)
     _bomb(folder / "skin.png")
+
+
+def _float_tiff(samples: int) -> bytes:
+    """A TIFF of 2 x 2 pixels of 32-bit floating-point numbers."""
+    short, long = 3, 4
+    entries = [(256, long, 2), (257, long, 2), (258, short, 32), (259, short, 1)]
+    entries += [(262, short, 2 if samples == 3 else 1), (273, long, 200), (277, short, samples)]
+    entries += [(278, long, 2), (279, long, 16 * samples), (339, short, 3)]
+    body = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in entries)
+    head = b"II*\0" + struct.pack("<IH", 8, len(entries)) + body + bytes(4)
+    return head.ljust(200, b"\0") + bytes(16 * samples)
 
 
 def _truncated(folder: Path) -> None:
@@ -121,10 +133,14 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     "backslashes above the folder": (_mtl("..\\outside.png"), OUTSIDE),
     "hidden climb": (_mtl("x/../../outside.png"), OUTSIDE),
     "absolute texture": (_absolute, "absolute path"),
-    "drive letter": (_mtl("C:\\skin.png"), "absolute path"),
+    "drive letter": (_mtl("C:\\gone.png"), "absolute path"),
+    "drive and a climb": (_mtl("C:\\maps\\..\\..\\outside.png"), OUTSIDE),
+    "drive in a drive": (_mtl("C:\\D:\\gone.png"), "absolute path"),
     "linked texture": (_link, "link out of"),
     "folder as texture": (_mtl("."), "not a file"),
     "texture is text": (_image(b"<html>"), "not an image"),
+    "texture of floats": (_image(_float_tiff(1)), "floating-point"),
+    "texture of three floats": (_image(_float_tiff(3)), "floating-point"),
     "texture is empty": (_image(b""), "not an image"),
     "texture is cut off": (_truncated, "broken"),
     "decompression bomb": (_image_bomb, "too many pixels"),
@@ -152,7 +168,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     "glTF text as image": (_gltf(_set("images", 0, {"uri": "data:image/png;base64,AAAA"})), "not an image"),
     "glTF huge accessor": (_gltf(_set("accessors", 0, "count", 10**12)), "claims"),
     "glTF node loop": (_gltf(_set("nodes", 0, "children", [0])), "not a tree"),
-    "glTF compressed": (_gltf(_set("extensionsRequired", ["KHR_draco_mesh_compression"])), "KHR_draco"),
+    "glTF compressed": (_gltf(_set("extensionsRequired", ["EXT_meshopt_compression"])), "EXT_meshopt"),
     "glTF texture coordinates": (_nan_uv, "not a finite number"),
     "glTF nonsense": (_gltf(_set("materials", 0, 5)), "not a glTF file"),
     "glTF version 1": (_gltf(_set("asset", "version", "1.0")), "not a glTF 2.0 file"),

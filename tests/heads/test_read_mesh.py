@@ -102,6 +102,45 @@ def test_the_texture_is_found_however_it_is_written(
     assert mesh.uv.max() == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize(
+    "map_kd",
+    ["C:\\work\\scan 7\\skin.png", "/home/anna/skin.png", "D:/x/maps/Skin.PNG", "\\\\nas\\heads\\skin.png"],
+)
+def test_an_absolute_name_of_another_machine_is_looked_for_here(
+    tmp_path: Path, scratch: Path, map_kd: str
+) -> None:
+    mesh = read(textured_obj(tmp_path / "a", map_kd), scratch)
+    assert mesh.materials[0].texture == tmp_path / "a" / "skin.png"
+
+
+def test_the_longest_end_of_an_absolute_name_is_the_file(tmp_path: Path, scratch: Path) -> None:
+    path = textured_obj(tmp_path / "a", "C:\\scans\\anna\\skin.png")
+    (tmp_path / "a" / "anna").mkdir()
+    Image.new("RGB", (8, 8)).save(tmp_path / "a" / "anna" / "skin.png")
+    assert read(path, scratch).materials[0].texture == tmp_path / "a" / "anna" / "skin.png"
+
+
+@pytest.mark.parametrize(
+    ("written", "encoding", "on_disk"),
+    [
+        ("Ge\u0301ne.png", "utf-8", "G\u00e9ne.png"),
+        ("G\u00e9ne.png", "utf-8", "Ge\u0301ne.png"),
+        ("G\u00e9ne.png", "latin-1", "G\u00e9ne.png"),
+        ("Gr\u00f6\u00dfe.png", "latin-1", "Gr\u00f6\u00dfe.png"),
+        ("\u76ae\u80a4.png", "gbk", "\u76ae\u80a4.png"),
+        ("\u982d\\\u76ae\u80a4 1.png", "gbk", "\u982d/\u76ae\u80a4 1.png"),
+    ],
+)
+def test_a_name_in_any_encoding_and_form_is_found(
+    tmp_path: Path, scratch: Path, written: str, encoding: str, on_disk: str
+) -> None:
+    path = textured_obj(tmp_path / "a", image=False)
+    (tmp_path / "a" / "head.mtl").write_bytes(f"newmtl skin\nmap_Kd {written}\n".encode(encoding))
+    (tmp_path / "a" / on_disk).parent.mkdir(exist_ok=True)
+    Image.new("RGB", (8, 8)).save(tmp_path / "a" / on_disk)
+    assert read(path, scratch).materials[0].texture == tmp_path / "a" / on_disk
+
+
 def test_file_names_with_blanks_and_texture_scale(tmp_path: Path, scratch: Path) -> None:
     path = textured_obj(tmp_path / "a", "-s 2 0.5 1 maps\\my skin.png")
     (tmp_path / "a" / "maps").mkdir()

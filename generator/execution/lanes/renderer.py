@@ -135,7 +135,7 @@ class Renderer:
                 pass
 
     def import_mesh(self, source: Path, folder: Path) -> Path:
-        """Have Blender read an FBX file and write it into folder as GLB, whose path is returned."""
+        """Have Blender read a mesh file and write it into folder as GLB, whose path is returned."""
         target = folder / f"{source.stem}.glb"
         self._send(ConvertOrder(str(source), str(target)))
         for _ in self._receipts():
