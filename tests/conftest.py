@@ -117,9 +117,10 @@ def placed_head(
     from generator.heads.read import read_mesh
     from generator.heads.source import find_heads
     from generator.placing.face import find_face
+    from generator.placing.looking import Eyes
 
     scratch = tmp_path_factory.mktemp("placed")
     head = find_heads(parametric_heads).heads[0]
     mesh = read_mesh(head, scratch)
-    placement = find_face(head, mesh, renderer, detector, scratch)
+    placement = find_face(head, mesh, Eyes(renderer, detector, scratch))
     return PlacedHead(head, placement, placement.normalise(mesh))

@@ -213,3 +213,14 @@ def test_a_program_that_calls_a_command_keeps_its_environment(monkeypatch: pytes
     before, path = dict(os.environ), sys.path[:]
     assert headturn("--version", monkeypatch=monkeypatch) == 0
     assert (dict(os.environ), sys.path) == (before, path)
+
+
+def test_listing_a_head_that_cannot_be_read_is_told_to_scripts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "fine.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    assert headturn("heads", "list", tmp_path, "--json", monkeypatch=monkeypatch) == 3
+    rows = {Path(row["path"]).name: row for row in json.loads(capsys.readouterr().out)["heads"]}
+    assert (rows["broken.obj"]["skipped"], rows["fine.obj"]["skipped"]) == (True, False)
+    assert headturn("heads", "list", tmp_path / "fine.obj", monkeypatch=monkeypatch) == 0

@@ -18,7 +18,10 @@ from .tables import applies, is_drawn, section_of
 
 SKIPPED_SHOWN = 3
 
-SELECTION = ("heads.subjects", "heads.expressions", "heads.units", "heads.up", "heads.forward")
+SELECTION = (
+    *("heads.subjects", "heads.expressions"),
+    *("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
+)
 """Settings in a panel of their own, which is closed at first."""
 
 OWN_PANEL = ("heads", "poses", "render")

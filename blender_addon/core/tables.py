@@ -49,7 +49,10 @@ def is_drawn(values: Values) -> bool:
 
 _APPLIES: dict[str, Callable[[Values], bool]] = {
     **dict.fromkeys(("heads.count", "heads.seed", "heads.sampled_expressions"), _made),
-    **dict.fromkeys(("heads.units", "heads.up", "heads.forward"), lambda values: not _made(values)),
+    **dict.fromkeys(
+        ("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
+        lambda values: not _made(values),
+    ),
     **dict.fromkeys(("poses.yaw", "poses.pitch", "poses.roll"), lambda values: _kind(values) != TABLE),
     **dict.fromkeys(("poses.count", "poses.seed", "poses.same"), is_drawn),
     "poses.path": lambda values: _kind(values) == TABLE,

@@ -18,7 +18,7 @@ from generator.plan.settings import Values, all_settings
 DEFAULTS = {"render.preset": "quality", "render.resolution": 512}
 """Of a picture that somebody looks at."""
 
-_OF_MESHES = ("heads.units", "heads.up", "heads.forward")
+_OF_MESHES = ("heads.units", "heads.up", "heads.forward", "heads.eye_distance_mm", "heads.without")
 
 
 def preview(

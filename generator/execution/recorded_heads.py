@@ -79,5 +79,7 @@ class RecordedHeads:
             units=wanted.units,
             up=wanted.up,
             forward=wanted.forward,
+            eye_distance_mm=wanted.eye_distance_mm,
+            without=wanted.without,
         )
         return {(head.subject, head.expression): head for head in source.heads}

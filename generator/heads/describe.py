@@ -21,10 +21,10 @@ def describe_source(
 
     Keys: subject, expression, source, path, vertices, triangles, texture
     ([width, height] of the first), vertex_colors, license, redistributable,
-    units (None: to be guessed), problems (list of lines), skipped (bool).
+    units (None: to be guessed), problems (list of lines), skipped (bool: a build would leave it out).
     What is not known, or not looked for without ``deep``, is None.
 
-    deep: read every mesh and texture; what fails becomes a problem of its row.
+    deep: read every mesh and texture; what fails becomes a problem of its row, which is then skipped.
     """
     rows = [_describe(head, deep, import_with_blender) for head in source.heads]
     for skip in source.skipped:
@@ -52,6 +52,7 @@ def _describe(head: Head, deep: bool, import_with_blender: ImportWithBlender | N
             row["texture"] = list(image_size(texture)) if texture else None
     except HeadError as error:
         row["problems"].append(str(error))
+        row["skipped"] = True
         return row
     row |= {"vertices": len(mesh.vertices), "triangles": len(mesh.triangles)}
     row["vertex_colors"] = mesh.vertex_colors is not None

@@ -24,6 +24,8 @@ class Head:
     units: "mm", "cm", "dm" or "m"; None means guess from the size of the face.
     up, forward: axes of the mesh such as "+Y" and "+Z"; None means guess.
     problems: what is wrong but does not stop the head from being built.
+    eye_distance_mm: between the outer eye corners, where it decides the scale; see
+        :func:`generator.heads.units.scale_of`. without: materials that are left out.
     """
 
     subject: str
@@ -38,6 +40,8 @@ class Head:
     up: str | None = None
     forward: str | None = None
     problems: tuple[str, ...] = ()
+    eye_distance_mm: float | None = None
+    without: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from generator.heads.mesh import HeadMesh
 from generator.heads.units import axes_rotation
 
+STRAIGHT = (0.0, 0.0, 0.0)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -21,7 +22,8 @@ class Placement:
     axes. radius_mm: of the sphere about the pivot that holds the head.
     eye_distance_mm: between the outer eye corners. notes: what was guessed.
     frame: "source" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
-    :meth:`normalise` only where frame is "canonical".
+    :meth:`normalise` only where frame is "canonical". turned_deg: yaw, pitch and roll of the face at
+    pose zero of the source's axes, where it does not look along them.
     """
 
     units: str
@@ -35,6 +37,7 @@ class Placement:
     frame: str = "source"
     correction: tuple[float, ...] = IDENTITY
     correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
+    turned_deg: tuple[float, ...] = STRAIGHT
 
     @property
     def levelling(self) -> np.ndarray:

@@ -17,6 +17,7 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.obj import read_obj
 from generator.heads.ply import read_ply
 from generator.heads.stl import read_stl
+from generator.heads.surroundings import without_materials
 from generator.heads.weld import weld
 
 ImportWithBlender = Callable[[Path, Path], Path]
@@ -26,7 +27,8 @@ ImportWithBlender = Callable[[Path, Path], Path]
 def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlender | None = None) -> HeadMesh:
     """The mesh of a head in its own units and axes, one vertex per position.
 
-    FaceScape's eye holes get eyeballs, and its mouth a dark inside.
+    FaceScape's eye holes get eyeballs, and its mouth a dark inside. What has a material that the
+    head is to be without is left out.
 
     Parameters
     ----------
@@ -43,8 +45,10 @@ def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlend
     try:
         check_mesh_file(path)
         if head.source == "facescape":
-            return add_eyeballs(weld(read_obj(path, scratch, texture=head.files[-1])), scratch)
-        return weld(_read(path, scratch, import_with_blender))
+            mesh = add_eyeballs(weld(read_obj(path, scratch, texture=head.files[-1])), scratch)
+        else:
+            mesh = weld(_read(path, scratch, import_with_blender))
+        return without_materials(mesh, head.without) if head.without else mesh
     except HeadError as error:
         raise HeadError(printable(f"{path}: {error}")) from error
     except OSError as error:

@@ -29,6 +29,8 @@ def find_heads(
     units: str | None = None,
     up: str | None = None,
     forward: str | None = None,
+    eye_distance_mm: float | None = None,
+    without: Sequence[str] | None = None,
 ) -> HeadSource:
     """The heads under ``path``, numbers in numerical order. Meshes are not parsed.
 
@@ -40,6 +42,7 @@ def find_heads(
         both ("2_smile"); None takes all.
     license, redistributable, units, up, forward: override what the source says
         or what would be guessed. FaceScape's licence cannot be overridden.
+    eye_distance_mm, without: of every head; see :class:`Head`.
 
     Raises
     ------
@@ -81,6 +84,8 @@ def find_heads(
             units=units or head.units,
             up=up or head.up,
             forward=forward or head.forward,
+            eye_distance_mm=eye_distance_mm,
+            without=tuple(without or ()),
             problems=tuple(p for p in head.problems if p != UNKNOWN_LICENSE or license is None),
         )
         for head in heads

@@ -35,6 +35,64 @@ CANDIDATE_AXES = (
 """(up, forward) to try, likeliest first, when a source does not say."""
 
 
+BY_EYES = "eyes"
+"""What stands for the unit of a mesh that is scaled by the distance between its eyes."""
+
+USUAL_EYE_DISTANCE_MM = 90.0
+"""Between the outer eye corners of a mesh of no unit, where nothing says how much it is."""
+
+
+def scale_of(eyes: float, units: str | None, eye_distance_mm: float | None) -> tuple[str, float, list[str]]:
+    """Unit of a mesh, millimetres in one of it, and what of that was guessed, a line each.
+
+    Parameters
+    ----------
+    eyes: between the outer eye corners, in source units.
+    units: what is said to be the unit; checked against the size of a face.
+    eye_distance_mm: what the eyes are apart; it decides, whatever the unit.
+
+    Raises
+    ------
+    HeadError: the unit that is said makes this no size of a face, or it has no size.
+    """
+    if not (math.isfinite(eyes) and eyes > 0):
+        raise HeadError("the outer eye corners lie on one point; no face can be measured there")
+    if eye_distance_mm is not None:
+        note = f"scaled so that the outer eye corners, {eyes:.4g} apart, are {eye_distance_mm:g} mm apart"
+        return BY_EYES, _rounded(eye_distance_mm / eyes), [note]
+    low, high = OUTER_EYE_DISTANCE_MM
+    if units is not None:
+        found = eyes * MM_PER_UNIT[units]
+        if not low <= found <= high:
+            raise HeadError(
+                f"in {units} the outer eye corners are {found:.4g} mm apart, and {low:.0f}-{high:.0f} mm are "
+                f"a face; correct the unit (--units), or give --eye-distance {found:.0f} if it is right"
+            )
+        return units, MM_PER_UNIT[units], []
+    try:
+        name, mm = guess_units(eyes)
+    except HeadError:
+        usual = USUAL_EYE_DISTANCE_MM
+        note = (
+            f"in no unit: the outer eye corners, {eyes:.4g} apart, are taken to be {usual:g} mm apart; "
+            "--eye-distance says otherwise"
+        )
+        return BY_EYES, _rounded(usual / eyes), [note]
+    return name, mm, [f"units guessed: {name} (outer eye corners {eyes:.4g} apart)"]
+
+
+def _rounded(scale: float) -> float:
+    """To six digits: the last ones of what a detector finds change from run to run."""
+    return float(f"{scale:.6g}")
+
+
+def is_scale(units: str, mm_per_unit: float) -> bool:
+    """Can a mesh in these units have so many millimetres in one?"""
+    if units == BY_EYES:
+        return math.isfinite(mm_per_unit) and mm_per_unit > 0
+    return MM_PER_UNIT.get(units) == mm_per_unit
+
+
 def guess_units(outer_eye_distance: float) -> tuple[str, float]:
     """Unit of a mesh from the distance between its outer eye corners.
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from generator.errors import HeadError
 from generator.geometry.camera import SENSOR_MM, Camera
-from generator.geometry.rotation import rotation_from_angles
+from generator.geometry.rotation import angles_from_rotation, rotation_from_angles
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
-from generator.heads.placement import Placement
+from generator.heads.placement import STRAIGHT, Placement
+from generator.heads.surroundings import head_alone
 from generator.landmarks.anchors import Anchors, no_anchors
 from generator.landmarks.detector import Detector
 from generator.landmarks.surface import Surface
@@ -44,18 +45,24 @@ def anchor_camera(eye_distance_mm: float) -> Camera:
 
 
 def anchor_views(
-    mesh: HeadMesh, camera: Camera, renderer: HeadRenderer, detector: Detector, scratch: Path
+    mesh: HeadMesh,
+    camera: Camera,
+    renderer: HeadRenderer,
+    detector: Detector,
+    scratch: Path,
+    turned_deg: tuple[float, ...] = STRAIGHT,
 ) -> list[Sighting]:
     """What the detector finds on each view and on its mirror image; nothing where there is no face.
 
-    mesh: frame U, mm, pivot at the origin.
+    mesh: frame U, mm, pivot at the origin. turned_deg: of the face in it.
     """
     package = scratch / "anchor.npz"
     save_package(mesh, package)
     pairs = detector.topology.mirror_pairs()
     sightings = []
-    views = Views(POSES, (camera,), (LOOK,))
-    for angles, path in zip(POSES, renderer.render(package, views), strict=True):
+    poses = _near_front(turned_deg)
+    views = Views(poses, (camera,), (LOOK,))
+    for angles, path in zip(poses, renderer.render(package, views), strict=True):
         image = read_image(path)
         rotation = rotation_from_angles(np.array(angles, dtype=np.float64))
         found = detector.detect(image)
@@ -70,6 +77,15 @@ def anchor_views(
     return sightings
 
 
+def _near_front(turned_deg: tuple[float, ...]) -> tuple[Pose, ...]:
+    """Poses that show a face that is turned in its mesh as POSES show one that looks along its axes."""
+    if turned_deg == STRAIGHT:
+        return POSES
+    back = rotation_from_angles(np.array(turned_deg)).T
+    turned = angles_from_rotation(rotation_from_angles(np.array(POSES)) @ back)
+    return tuple((yaw, pitch, roll) for yaw, pitch, roll in turned.tolist())
+
+
 def anchor_head(
     mesh: HeadMesh, placement: Placement, renderer: HeadRenderer, detector: Detector, scratch: Path
 ) -> tuple[Anchors, Levelling | None]:
@@ -78,9 +94,9 @@ def anchor_head(
     mesh: as read. The anchors' points are about the pivot, in the mesh's own axes
     (frame C at pose zero of frame = "source").
     """
-    placed = replace(placement, frame="source").normalise(mesh)
+    placed = replace(placement, frame="source").normalise(head_alone(mesh, placement))
     camera = anchor_camera(placement.eye_distance_mm)
-    views = anchor_views(placed, camera, renderer, detector, scratch)
+    views = anchor_views(placed, camera, renderer, detector, scratch, placement.turned_deg)
     if not views:
         return no_anchors(detector.topology), None
     surface = Surface(placed)

@@ -3,31 +3,32 @@
 
 Heads come with shoulders, in any unit and on any origin, so nothing is read off
 the mesh's box. The head is rendered from the front, the detector finds the
-face, and the landmarks that matter are cast back onto the surface.
+face, and the landmarks that matter are cast back onto the surface. Where that
+shows no face, or one that is turned, the mesh is looked at from all round, and
+again from where its face looks to, until that is its front.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
 from generator.errors import HeadError
-from generator.geometry.camera import Camera
-from generator.geometry.raycast import first_hits
-from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
+from generator.geometry.rotation import (
+    angles_from_rotation,
+    geodesic_deg,
+    graphics_rotation,
+)
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
-from generator.heads.package import save_package
 from generator.heads.placement import Placement
-from generator.heads.units import CANDIDATE_AXES, MM_PER_UNIT, axes_rotation, guess_units
-from generator.landmarks.detector import Detector
-from generator.landmarks.topology import Topology
-from generator.placing.rendering import HeadRenderer, read_image
-from generator.plan.settings import Look
-from generator.plan.views import View, Views
+from generator.heads.surroundings import clusters, surroundings
+from generator.heads.units import CANDIDATE_AXES, axes_rotation, scale_of
+from generator.placing.around import Sight, find_around
+from generator.placing.looking import MAX_RESIDUAL, Eyes, Face, look
 
 PIVOT_DEPTH = 1.00
 """Depth of the ear axis behind the outer eye corners, in outer-eye distances.
@@ -38,94 +39,206 @@ About 90 mm for eyes 90 mm apart; a convention, see docs/heads.md.
 REACH = 2.0
 """Vertices farther from the pivot than this many eye distances are not the head."""
 
-MAX_TILT_DEG = 40.0
-"""A face turned more than this from the front means the axes are wrong."""
+STRAIGHT_DEG = (8.0, 15.0, 8.0)
+"""A face with less yaw, pitch and roll than this looks along its axes. Heads are shaped differently, and
+above all their profile leaves open where their pitch is zero."""
 
-_PIXELS, _LENS_MM = 384, 200.0
-_LOOK = Look(samples=4, light_yaw_deg=0.0, light_pitch_deg=20.0, ambient=0.5)
+MAYBE_STRAIGHT_DEG = 25.0
+"""What is seen from all round as less turned than this is looked at along its axes."""
+
+SETTLED_DEG = 1.0
+"""Faces are turned to the camera until they are as near to the front as this."""
+
+TURNS = 6
+"""How often that is tried."""
+
+MAX_TURN_DEG = 65.0
+"""A face is never farther than this from the nearest axes of its mesh; where others are asked for, they
+are wrong."""
+
+NEARLY_DEG = 5.0
+"""Axes that are this much nearer are not preferred to likelier ones."""
+
+MOST_GROUPS = 2
+"""Of parts that lie apart, these many are looked at."""
+
 _WINDOWS = (1.0, 0.6, 0.36, 0.22)
 """Share of the mesh's height that is looked at, from the crown down: a head, a bust, a body."""
 
 _FACE_WINDOW = 3.4
 """Side of the second, sharp look, in outer-eye distances."""
 
+_FIRST_WINDOW = 4.0
+"""Side of the first look at what was seen from all round."""
 
-def find_face(
-    head: Head, mesh: HeadMesh, renderer: HeadRenderer, detector: Detector, scratch: Path
-) -> Placement:
+Axes = tuple[str, str]
+"""Up and forward."""
+
+
+def find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
     """Find the face of one head; see the module's docstring.
 
-    Raises HeadError if no face is found from the front, or its size fits no unit.
+    Raises HeadError if no face is found, it does not look along the axes that were asked for, or its
+    size does not fit the unit that was.
     """
-    if head.up and head.forward:
-        axes = [(head.up, head.forward)]
-    else:
-        axes = [
-            (up, forward)
-            for up, forward in CANDIDATE_AXES
-            if head.up in (None, up) and head.forward in (None, forward)
-        ]
-    for up, forward in axes:
-        turned = replace(mesh, vertices=mesh.vertices @ axes_rotation(up, forward).T)
-        face = _find_face(turned, renderer, detector, scratch)
-        if face is not None:
-            return _measure(head, turned, face, up, forward, guessed=(up, forward) != axes[0])
-    tried = "" if len(axes) == 1 else f" in any of {len(axes)} orientations"
+    try:
+        return _find_face(head, mesh, eyes)
+    except HeadError as error:
+        raise HeadError(f"{head.mesh_path}: {error}") from error
+
+
+def _find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
+    first = _axes_of(head)[0]
+    if (placement := _straight(head, mesh, mesh, first, eyes)) is not None:
+        return placement
+    groups = clusters(mesh, MOST_GROUPS)
+    for part in groups:
+        if (placement := _straight(head, mesh, part, first, eyes)) is not None:
+            return placement
+    for part in groups or [mesh]:
+        for sight in find_around(part, eyes):
+            axes = _nearest_axes(head, sight.turn)
+            maybe = axes != first and _apart_deg(axes, sight.turn) <= MAYBE_STRAIGHT_DEG
+            if maybe and (placement := _straight(head, mesh, part, axes, eyes)) is not None:
+                return placement
+            if (settled := _settle(part, sight, eyes)) is not None:
+                return _turned(head, mesh, *settled)
     raise HeadError(
-        f"{head.mesh_path}: no face was found from the front{tried}; "
-        "check the mesh and its texture, or give --up and --forward"
+        "no face was found from any side; check the mesh and its texture, and that it shows the whole face"
     )
 
 
-@dataclass(frozen=True)
-class _Face:
-    """Points on the surface, frame U, source units."""
+def _straight(head: Head, mesh: HeadMesh, part: HeadMesh, axes: Axes, eyes: Eyes) -> Placement | None:
+    """The placement of a face in part of the mesh that looks along some axes, or None."""
+    rotation = axes_rotation(*axes)
+    face = _along(replace(part, vertices=part.vertices @ rotation.T), eyes)
+    if face is None or face.residual > MAX_RESIDUAL:
+        return None
+    if (np.abs(angles_from_rotation(face.turn)) > STRAIGHT_DEG).any():
+        return None
+    return _measure(head, mesh, face, axes, rotation, ())
 
-    right_eye: np.ndarray
-    left_eye: np.ndarray
-    chin: np.ndarray
+
+def _turned(head: Head, mesh: HeadMesh, face: Face, turn: np.ndarray) -> Placement:
+    """The placement of a face that looks past the mesh's axes. turn: R_C in the mesh's own."""
+    axes = _nearest_axes(head, turn)
+    in_axes = graphics_rotation(axes_rotation(*axes)) @ turn
+    angle = _apart_deg(axes, turn)
+    angles = np.round(angles_from_rotation(in_axes), 2) + 0.0
+    yaw, pitch, roll = (float(value) for value in angles)
+    said = f"yaw {yaw:.0f}, pitch {pitch:.0f}, roll {roll:.0f} degrees"
+    if angle > MAX_TURN_DEG:
+        raise HeadError(
+            f"the face is turned by {angle:.0f} degrees ({said}) from up {axes[0]}, forward {axes[1]}; "
+            "correct --up and --forward, or leave them out"
+        )
+    face_rotation = graphics_rotation(turn.T)
+    return _measure(head, mesh, face, axes, face_rotation, (yaw, pitch, roll))
 
 
-def _measure(head: Head, mesh: HeadMesh, face: _Face, up: str, forward: str, *, guessed: bool) -> Placement:
-    eyes = float(np.linalg.norm(face.left_eye - face.right_eye))
-    notes = []
-    if head.units is not None:
-        units, scale = head.units, MM_PER_UNIT[head.units]
-    else:
-        units, scale = guess_units(eyes)
-        notes.append(f"units guessed: {units} (outer eye corners {eyes:.4g} apart)")
-    if guessed:
+def _measure(
+    head: Head,
+    mesh: HeadMesh,
+    face: Face,
+    axes: Axes,
+    rotation: np.ndarray,
+    turned_deg: tuple[float, ...],
+) -> Placement:
+    """rotation: R_U from the mesh's own axes to those that the face was found in."""
+    up, forward = axes
+    width = face.width
+    units, scale, notes = scale_of(width, head.units, head.eye_distance_mm)
+    if axes != _axes_of(head)[0]:
         notes.append(f"axes guessed: up {up}, forward {forward}")
-    middle = (face.left_eye + face.right_eye) / 2
-    pivot = middle - [0.0, 0.0, PIVOT_DEPTH * eyes]
-    from_pivot = mesh.vertices - pivot
-    reach = np.linalg.norm(from_pivot, axis=1)
-    is_head = (mesh.vertices[:, 1] >= face.chin[1] - 0.1 * eyes) & (reach <= REACH * eyes)
+    if turned_deg:
+        yaw, pitch, roll = turned_deg
+        notes.append(
+            f"the face is turned from up {up}, forward {forward}: yaw {yaw:.0f}, pitch {pitch:.0f}, roll "
+            f"{roll:.0f} degrees, which is no pose zero; frame canonical levels it"
+        )
+    pivot = face.middle - [0.0, 0.0, PIVOT_DEPTH * width]
+    vertices = mesh.vertices @ rotation.T
+    reach = np.linalg.norm(vertices - pivot, axis=1)
+    is_head = (vertices[:, 1] >= face.chin[1] - 0.1 * width) & (reach <= REACH * width)
     # Rounded to hundredths of a millimetre: far below what a detector can tell,
     # and the same numbers are then printed, stored and used.
-    in_source_axes = pivot @ axes_rotation(up, forward)
     step = 0.01 / scale
+    in_source_axes = np.round(np.round(pivot @ rotation / step) * step, 9)
+    radius = round(float(reach[is_head].max()) * scale, 2)
+    kept = surroundings(mesh, in_source_axes, radius / scale)
+    if not kept.all():
+        is_kept = np.zeros(len(vertices), dtype=bool)
+        is_kept[mesh.triangles[kept]] = True
+        radius = round(float(reach[is_head & is_kept].max()) * scale, 2)
+        kept = surroundings(mesh, in_source_axes, radius / scale)
+        notes.append(
+            f"{(~kept).sum()} of {len(kept)} triangles are left out: they lie apart from this face's head"
+        )
     return Placement(
         units=units,
         mm_per_unit=scale,
         up=up,
         forward=forward,
-        pivot=tuple(np.round(np.round(in_source_axes / step) * step, 9).tolist()),
-        radius_mm=round(float(reach[is_head].max()) * scale, 2),
-        eye_distance_mm=round(eyes * scale, 2),
+        pivot=tuple(in_source_axes.tolist()),
+        radius_mm=radius,
+        eye_distance_mm=round(width * scale, 2),
         notes=tuple(notes),
+        turned_deg=turned_deg or (0.0, 0.0, 0.0),
     )
 
 
-def _find_face(mesh: HeadMesh, renderer: HeadRenderer, detector: Detector, scratch: Path) -> _Face | None:
+def _axes_of(head: Head) -> list[Axes]:
+    """Axes that a head may have, likeliest first: those it says, and what they leave open."""
+    if head.up and head.forward:
+        return [(head.up, head.forward)]
+    signed = [sign + axis for axis in "XYZ" for sign in "+-"]
+    others = [(u, f) for u, f in permutations(signed, 2) if u[1] != f[1] and (u, f) not in CANDIDATE_AXES]
+    return [
+        (up, forward)
+        for up, forward in (*CANDIDATE_AXES, *others)
+        if head.up in (None, up) and head.forward in (None, forward)
+    ]
+
+
+def _nearest_axes(head: Head, turn: np.ndarray) -> Axes:
+    """Those of a head's that are nearest to a face, or the likeliest that are nearly as near.
+
+    turn: R_C in the mesh's own axes.
+    """
+    face, known = graphics_rotation(turn.T), _axes_of(head)
+    apart = geodesic_deg(np.stack([axes_rotation(*axes) for axes in known]), face)
+    return known[int((apart <= apart.min() + NEARLY_DEG).argmax())]
+
+
+def _apart_deg(axes: Axes, turn: np.ndarray) -> float:
+    return float(geodesic_deg(axes_rotation(*axes), graphics_rotation(turn.T)))
+
+
+def _settle(mesh: HeadMesh, sight: Sight, eyes: Eyes) -> tuple[Face, np.ndarray] | None:
+    """Render, fit, turn, again until the face is frontal: the face, in axes of its own, and its turn.
+
+    None if it never is, or is no face.
+    """
+    turn, middle, side = sight.turn, sight.middle, _FIRST_WINDOW * sight.width
+    for _ in range(TURNS):
+        own = graphics_rotation(turn)
+        face = look(replace(mesh, vertices=mesh.vertices @ own), middle @ own, side, eyes, closely=True)
+        if face is None or not np.isfinite(face.residual):
+            return None
+        middle, side = own @ face.middle, _FACE_WINDOW * face.width
+        turn = turn @ face.turn
+        if geodesic_deg(np.eye(3), face.turn) <= SETTLED_DEG:
+            return (face.seen_from(face.turn), turn) if face.residual <= MAX_RESIDUAL else None
+    return None
+
+
+def _along(mesh: HeadMesh, eyes: Eyes) -> Face | None:
     for centre, side in _windows(mesh):
-        coarse = _look(mesh, centre, side, renderer, detector, scratch)
+        coarse = look(mesh, centre, side, eyes)
         if coarse is None:
             continue
-        eyes = (coarse.left_eye + coarse.right_eye) / 2
-        width = float(np.linalg.norm(coarse.left_eye - coarse.right_eye))
-        sharp = _look(mesh, eyes, _FACE_WINDOW * width, renderer, detector, scratch)
-        return sharp if sharp is not None else coarse
+        sharp = look(mesh, coarse.middle, _FACE_WINDOW * coarse.width, eyes, closely=True)
+        return sharp if sharp is not None else look(mesh, centre, side, eyes, closely=True)
     return None
 
 
@@ -138,46 +251,3 @@ def _windows(mesh: HeadMesh) -> Iterator[tuple[np.ndarray, float]]:
         if share < 1.0:
             middle[1] = high[1] - 0.45 * side
         yield middle, side
-
-
-def _look(
-    mesh: HeadMesh,
-    centre: np.ndarray,
-    side: float,
-    renderer: HeadRenderer,
-    detector: Detector,
-    scratch: Path,
-) -> _Face | None:
-    """Render a square window of the mesh (frame U, any unit) from the front and find the face."""
-    mm = 300.0 / side
-    seen = replace(mesh, vertices=(mesh.vertices - centre) * mm)
-    # From outside everything: nothing of the mesh may lie behind the camera.
-    distance = max(150.0 * _LENS_MM / 18.0, float(seen.vertices[:, 2].max()) * 1.1)
-    camera = Camera.square(_PIXELS, _LENS_MM, distance)
-    package = scratch / "look.npz"
-    save_package(seen, package)
-    [path] = renderer.render(package, Views.of([View((0.0, 0.0, 0.0), camera, _LOOK)]))
-    landmarks = detector.detect(read_image(path))
-    if landmarks is None or not _is_frontal(landmarks, detector.topology):
-        return None
-    points = detector.topology
-    pixels = landmarks[[points.right_eye_outer, points.left_eye_outer, points.chin], :2]
-    origins, rays = camera.rays(pixels)
-    vertices = seen.vertices @ CAMERA_FROM_GRAPHICS + camera.translation_mm
-    hits = first_hits(origins, rays, vertices, mesh.triangles)
-    if np.isnan(hits).any():
-        return None
-    found = (hits - camera.translation_mm) @ CAMERA_FROM_GRAPHICS / mm + centre
-    return _Face(*found)
-
-
-def _is_frontal(landmarks: np.ndarray, points: Topology) -> bool:
-    right, left = landmarks[points.right_eye_outer], landmarks[points.left_eye_outer]
-    across, down = left - right, landmarks[points.chin] - (left + right) / 2
-    nose = landmarks[points.nose_tip] - (left + right) / 2
-    aligned = np.cos(np.deg2rad(MAX_TILT_DEG))
-    return bool(
-        across[0] > aligned * np.linalg.norm(across)
-        and down[1] > aligned * np.linalg.norm(down)
-        and nose[2] < 0
-    )

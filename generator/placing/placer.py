@@ -16,6 +16,7 @@ from generator.messages import HeadFacts, Placed
 from generator.placing.anchoring import anchor_head, level_head
 from generator.placing.face import find_face
 from generator.placing.levelling import Levelling
+from generator.placing.looking import Eyes
 from generator.placing.rendering import HeadRenderer
 
 
@@ -40,7 +41,7 @@ class Placer:
 
         Raises HeadError if no face is found.
         """
-        return find_face(head, mesh, self._renderer, self._detector, self._scratch)
+        return find_face(head, mesh, Eyes(self._renderer, self._detector, self._scratch))
 
     def stand(self, heads: Sequence[Head], frame: str) -> Placement:
         """Where a subject stands, by the first of its heads that shows a face; see :meth:`subject`."""

@@ -68,6 +68,15 @@ class Heads:
         ),
         label="Units",
     )  # fmt: skip
+    eye_distance_mm: float | None = setting(
+        None, "Between the outer eye corners of meshes that are in no unit; such meshes get 90 mm where it "
+        "is not given",
+        unit="mm", low=20, high=500, label="Eye distance",
+    )  # fmt: skip
+    without: tuple[str, ...] | None = setting(
+        None,
+        "Leave out what has this material, such as lash cards; repeatable",
+    )
     up: str | None = setting(
         None, "Axis of the meshes' crown, such as +Y; found from the face where it is not given",
         choices=_AXES, label="Up",

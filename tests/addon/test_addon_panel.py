@@ -39,7 +39,8 @@ def test_rows_are_what_means_something_in_the_order_of_the_table() -> None:
     assert names(("heads",), {}, selection=True) == ["heads_subjects", "heads_expressions"]
     folder: Values = {"heads": {"source": "/faces"}}
     assert names(("heads",), folder, selection=False) == ["heads_source"]
-    assert names(("heads",), folder, selection=True)[2:] == ["heads_units", "heads_up", "heads_forward"]
+    meshes = ["heads_units", "heads_eye_distance_mm", "heads_up", "heads_forward"]
+    assert names(("heads",), folder, selection=True)[2:] == meshes
     assert names(("poses",), {"poses": {"kind": "csv"}}) == ["poses_kind", "poses_path", "poses_frame"]
     drawn = panel.rows(("poses",), {"poses": {"kind": "uniform", "yaw": [-50, 50, 10]}})
     parts = {row.field.setting.key: row.parts for row in drawn}

@@ -101,6 +101,11 @@ def test_a_view_that_differs_from_the_settings_is_in_the_name(
     assert not set(dry.parts) & set(built_anew(dry))
 
 
+def test_so_is_what_is_left_out_of_a_head(dry: DryBuild) -> None:
+    dry.build()
+    assert not set(dry.parts) & set(built_anew(dry, heads={"without": ["lashes"]}))
+
+
 def test_what_does_not_is_not(dry: DryBuild) -> None:
     """A unit size that cuts the six poses the same way, a seed that draws nothing."""
     dry.build(poses={"roll": [0, 0, 1]}, dataset={"unit_size": 3})

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from generator.errors import HeadError, UsageError
-from generator.heads.units import CANDIDATE_AXES, axes_rotation, guess_units
+from generator.heads.units import CANDIDATE_AXES, axes_rotation, guess_units, is_scale, scale_of
 
 
 @pytest.mark.parametrize(("unit", "mm"), [("um", 0.001), ("mm", 1), ("cm", 10), ("dm", 100), ("m", 1000)])
@@ -39,3 +39,22 @@ def test_axes_become_frame_u() -> None:
 def test_impossible_axes(up: str, forward: str) -> None:
     with pytest.raises(UsageError):
         axes_rotation(up, forward)
+
+
+def test_a_mesh_of_no_unit_is_scaled_by_its_eyes_and_that_is_said() -> None:
+    units, scale, notes = scale_of(0.31, None, None)
+    assert (units, scale * 0.31) == ("eyes", pytest.approx(90, rel=1e-5))
+    assert "90 mm" in notes[0] and "--eye-distance" in notes[0]
+    units, scale, notes = scale_of(21.0, "mm", 84.0)
+    assert (units, scale, is_scale(units, scale)) == ("eyes", 4.0, True)
+    assert "84 mm" in notes[0]
+    assert scale_of(9.1, None, None)[:2] == ("cm", 10.0)
+
+
+@pytest.mark.parametrize(
+    ("eyes", "units"), [(0.31, "m"), (91.0, "cm"), (9.1, "mm"), (0.0, "mm"), (0.0, None)]
+)
+def test_a_unit_that_makes_it_no_face_is_refused(eyes: float, units: str | None) -> None:
+    with pytest.raises(HeadError):
+        scale_of(eyes, units, None)
+    assert not is_scale("eyes", float("nan")) and not is_scale("cm", 1.0)

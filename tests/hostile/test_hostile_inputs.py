@@ -202,6 +202,7 @@ def test_a_head_that_nobody_made_is_skipped_with_its_reason(name: str, tmp_path:
     assert len(rows) == 1
     assert rows[0]["vertices"] is None
     assert rows[0]["problems"] and all(len(p) < 700 and "\n" not in p for p in rows[0]["problems"])
+    assert rows[0]["skipped"]
 
 
 def test_a_chain_that_a_rig_may_have_is_read(tmp_path: Path) -> None:

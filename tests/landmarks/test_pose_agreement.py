@@ -20,6 +20,7 @@ from generator.landmarks.mediapipe_mesh import MediaPipeFaceMesh
 from generator.landmarks.reference_face import fit_pose
 from generator.landmarks.topology import FACE_MESH
 from generator.placing.face import find_face
+from generator.placing.looking import Eyes
 from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig
 from generator.plan.settings import Render
@@ -74,7 +75,7 @@ def test_on_real_heads(
 ) -> None:
     [head] = find_heads(shared_heads / name).heads
     mesh = read_mesh(head, tmp_path)
-    placement = find_face(head, mesh, renderer, detector, tmp_path)
+    placement = find_face(head, mesh, Eyes(renderer, detector, tmp_path))
     error = disagreement(placement.normalise(mesh), placement.radius_mm, renderer, detector, tmp_path)
     assert np.median(error) < 5
     assert error.max() < 10

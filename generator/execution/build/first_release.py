@@ -40,7 +40,7 @@ def names(
         return None
     if any(versions.get(name) != value for name, value in recorded.items() if name != RELEASE):
         return None
-    if later_settings(config.as_dict()):
+    if later_settings(config.as_dict()) or planned.head.without or any(planned.placement.turned_deg):
         return None
     settings = {key: plain(getattr(config.render, key)) for key in FIRST_SETTINGS["render"]}
     settings["samples"] = config.render.cycles_samples
@@ -48,7 +48,7 @@ def names(
     look = _digest(
         {
             "settings": settings,
-            "prepared": {key: plain(value) for key, value in vars(placement).items()},
+            "prepared": {key: plain(value) for key, value in vars(placement).items() if key != "turned_deg"},
             "anchors": base64.b64encode(np.ascontiguousarray(planned.points, "<f8").tobytes()).decode(
                 "ascii"
             ),

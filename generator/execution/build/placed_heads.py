@@ -15,7 +15,7 @@ from generator.dataset.format.files import append_line
 from generator.errors import DatasetError, HeadturnError, WorkerError
 from generator.execution.executors.executor import Executor
 from generator.execution.lanes.slot import Outcome
-from generator.heads.units import MM_PER_UNIT, axes_rotation
+from generator.heads.units import axes_rotation, is_scale
 from generator.landmarks.facing import levelling_problem
 from generator.messages import Placed, PlaceOrder, Versions, VersionsOrder, expect, from_json, to_json
 from generator.plan.settings import Landmarks
@@ -94,7 +94,7 @@ def _problem(placed: Placed, order: PlaceOrder) -> str:
     placement = placed.placement
     if len(placed.facts) != len(order.heads) or placement.frame != order.frame:
         return "it is about other heads"
-    if MM_PER_UNIT.get(placement.units) != placement.mm_per_unit:
+    if not is_scale(placement.units, placement.mm_per_unit):
         return f"{placement.mm_per_unit!r} mm are not in one {placement.units}"
     try:
         axes_rotation(placement.up, placement.forward)

@@ -34,6 +34,8 @@ def find_source(config: BuildConfig, root: Path, reporter: Progress) -> HeadSour
         units=heads.units,
         up=heads.up,
         forward=heads.forward,
+        eye_distance_mm=heads.eye_distance_mm,
+        without=heads.without,
     )
     if subjects is None:
         return source

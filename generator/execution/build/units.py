@@ -94,6 +94,7 @@ def plan_units(
                 "anchors": to_plain(points),
                 "split": planned.split,
                 "settings": settings,
+                **({"without": head.without} if head.without else {}),
             }
         )
         earlier = first_release.names(planned, config, recorded_versions, versions)

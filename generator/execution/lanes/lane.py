@@ -32,6 +32,7 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
+from generator.heads.surroundings import head_alone
 from generator.landmarks.detector import Detector, open_detector
 from generator.landmarks.surface import Surface
 from generator.messages import BuildOrder, Built, LaneOrder, PlaceOrder, Receipt, Versions, VersionsOrder
@@ -223,7 +224,7 @@ class Lane:
         package = self._scratch / "head.npz"
         if (head, placement) != self._loaded:
             self._loaded = None
-            mesh = placement.normalise(self.read(head))
+            mesh = placement.normalise(head_alone(self.read(head), placement))
             save_package(mesh, package)
             self._surface = Surface(mesh)
             self._loaded = head, placement

@@ -16,6 +16,7 @@ from generator.geometry.rotation import rotation_from_angles
 from generator.heads.head import NEUTRAL
 from generator.heads.package import save_package
 from generator.heads.source import find_heads
+from generator.heads.surroundings import head_alone
 from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig
 from generator.plan.view_plan import plan_views
@@ -49,6 +50,8 @@ def render_preview(
         units=wanted.units,
         up=wanted.up,
         forward=wanted.forward,
+        eye_distance_mm=wanted.eye_distance_mm,
+        without=wanted.without,
     )
     subjects = sorted({head.subject for head in source.heads})
     if not subjects:
@@ -64,7 +67,7 @@ def render_preview(
             mesh = lane.read(head)
             placement = lane.placer(config.landmarks).face(head, mesh)
             package = scratch / "preview.npz"
-            save_package(placement.normalise(mesh), package)
+            save_package(placement.normalise(head_alone(mesh, placement)), package)
             [path] = lane.renderer.render(package, plan_views(config, head.name, placement.radius_mm, [pose]))
             image = read_image(path)
             found = lane.detector(config.landmarks).detect(image)

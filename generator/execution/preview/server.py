@@ -47,6 +47,7 @@ from generator.execution.preview.picture import draw_points
 from generator.heads.head import Head, HeadSource
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
+from generator.heads.surroundings import head_alone
 from generator.placing.rendering import read_image
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.pose_plans import plan_poses
@@ -152,7 +153,9 @@ class PreviewServer:
             content = [file_sha256(file) for file in head.files]
         except OSError as error:
             raise HeadError(f"{head.name}: {error.filename}: {error.strerror}") from error
-        name = hashlib.sha256(json.dumps([content, config.poses.frame, pixels]).encode()).hexdigest()[:32]
+        name = hashlib.sha256(
+            json.dumps([content, config.poses.frame, pixels, *head.without]).encode()
+        ).hexdigest()[:32]
         picture = Path(cache) / f"{name}.png"
         if not picture.exists():
             placement = self._placement(config, subject)
@@ -190,7 +193,7 @@ class PreviewServer:
         shutil.rmtree(textures, ignore_errors=True)
         textures.mkdir(parents=True)
         mesh = self._open_lane().read(head, textures)
-        save_package(placement.normalise(mesh), target)
+        save_package(placement.normalise(head_alone(mesh, placement)), target)
         return mesh.problems, len(mesh.vertices)
 
     def _render(self, package: Path, views: Views) -> Iterator[np.ndarray]:
