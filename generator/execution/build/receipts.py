@@ -49,10 +49,13 @@ class Receipts:
         stamp = self._stamp(path, order)
         if part is None or known_stamp != stamp:
             try:
-                part = check_unit(self._root, path, order)
+                found = check_unit(self._root, path, order)
+                if part is not None and found.digest != part.digest:
+                    raise DatasetError(f"{path}: holds other values than were committed")
             except DatasetError as error:
                 self.refused[path] = str(error)
                 return None
+            part = found
             self._known[path] = part, stamp
         if part.rows != len(order.views):
             self.refused[path] = f"{path}: has {part.rows} rows, expected {len(order.views)}"

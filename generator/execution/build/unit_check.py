@@ -10,10 +10,11 @@ from typing import cast
 
 import numpy as np
 
+from generator import registries
 from generator.dataset.format.columns import ImageMode
 from generator.dataset.format.part import check_part, iter_part, part_schema_of
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import image_path, passes_path, sample_id
+from generator.dataset.format.schema import image_path, part_schema, passes_path, sample_id
 from generator.dataset.proof.context import RowContext
 from generator.dataset.proof.row_checks import row_checks
 from generator.errors import DatasetError
@@ -54,10 +55,16 @@ def check_unit(root: Path, path: str, order: BuildOrder) -> PartInfo:
 
 
 def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
-    metadata = part_schema_of(file).metadata or {}
-    if metadata.get(b"headturn.configuration_digest", b"").decode() != order.configuration_digest:
-        yield "belongs to a dataset of another configuration"
+    stored = part_schema_of(file)
+    topology = registries.DETECTORS.get(order.landmarks.detector).topology
+    expected_schema = part_schema(cast(ImageMode, order.images), {}, order.configuration_digest, topology)
+    if not stored.equals(expected_schema) or stored.metadata is None:
+        yield "has other columns than a part of this dataset"
         return
+    for key in (b"headturn.configuration_digest", b"headturn.images", b"headturn.landmark_topology"):
+        if stored.metadata.get(key) != expected_schema.metadata[key]:
+            yield "belongs to a dataset of another configuration"
+            return
     head = order.head
     expected = iter(
         (sample_id(head.subject, head.expression, pose_name(*view.pose)), order.split, head.license)
