@@ -50,8 +50,8 @@ class Receipts:
         if part is None or known_stamp != stamp:
             try:
                 found = check_unit(self._root, path, order)
-                if part is not None and found.digest != part.digest:
-                    raise DatasetError(f"{path}: holds other values than were committed")
+                if part is not None and found.sha256 != part.sha256:
+                    raise DatasetError(f"{path}: is not the file that was committed (SHA-256 differs)")
             except DatasetError as error:
                 self.refused[path] = str(error)
                 return None

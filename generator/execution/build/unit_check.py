@@ -21,6 +21,9 @@ from generator.errors import DatasetError
 from generator.messages import BuildOrder
 from generator.plan.poses import pose_name
 
+_VERSIONS = b"headturn.versions"
+"""What of a part's metadata a resumed build may differ in: the release."""
+
 _OF_TABLES = "identity"
 """The check that compares rows with heads.parquet and poses.csv, which an unfinished build has not."""
 
@@ -56,17 +59,20 @@ def check_unit(root: Path, path: str, order: BuildOrder) -> PartInfo:
 
 def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
     stored = part_schema_of(file)
+    if stored.metadata is None:
+        yield "says nothing about its dataset"
+        return
     topology = registries.DETECTORS.get(order.landmarks.detector).topology
     expected_schema = part_schema(cast(ImageMode, order.images), {}, order.configuration_digest, topology)
-    if not stored.equals(expected_schema) or stored.metadata is None:
+    if not stored.equals(expected_schema):
         yield "has other columns than a part of this dataset"
         return
-    for key in (b"headturn.configuration_digest", b"headturn.images", b"headturn.landmark_topology"):
-        if stored.metadata.get(key) != expected_schema.metadata[key]:
-            yield "belongs to a dataset of another configuration"
-            return
+    expected, said = ({**schema.metadata, _VERSIONS: b""} for schema in (expected_schema, stored))
+    if expected != said:
+        yield "belongs to a dataset of another configuration"
+        return
     head = order.head
-    expected = iter(
+    rows = iter(
         (sample_id(head.subject, head.expression, pose_name(*view.pose)), order.split, head.license)
         for view in order.views
     )
@@ -76,7 +82,7 @@ def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
         named = zip(
             *(batch.column(name).to_pylist() for name in ("sample_id", "split", "head_license")), strict=True
         )
-        if list(named) != list(islice(expected, len(batch))):
+        if list(named) != list(islice(rows, len(batch))):
             yield "holds rows of another head or of other poses"
             return
         context = _context(root, order, start, len(batch))
