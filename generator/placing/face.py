@@ -104,7 +104,8 @@ def _find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
             if (settled := _settle(part, sight, eyes)) is not None:
                 return _turned(head, mesh, *settled)
     raise HeadError(
-        "no face was found from any side; check the mesh and its texture, and that it shows the whole face"
+        "no face was found from the front or any other side; check the mesh and its texture, and that it "
+        "shows the whole face"
     )
 
 
