@@ -80,6 +80,7 @@ def run(command: list[str], cwd: Path, **environment: str) -> subprocess.Complet
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("started", ["as scripts", "as modules"])
 def test_the_commands_themselves(tmp_path: Path, started: str) -> None:
     names = {*sys.stdlib_module_names, "numpy", "pyarrow", "typer", "rich", "pydantic", "click", "bpy"}

@@ -52,6 +52,7 @@ def test_a_reader_says_what_it_promises_of_every_input(target: Target) -> None:
         assert time.monotonic() - began < SLOWEST_S, name
 
 
+@pytest.mark.slow
 def test_no_input_takes_a_gigabyte() -> None:
     """As the fuzzer has it: whoever asks for more gets a MemoryError."""
     code = (

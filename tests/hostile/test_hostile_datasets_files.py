@@ -185,6 +185,7 @@ def test_a_table_that_would_fill_the_memory(
     assert code == 0 or Path(file).name in said
 
 
+@pytest.mark.slow
 def test_what_unpacks_to_much_more_than_is_stored_is_known_from_the_footer(tmp_path: Path) -> None:
     path = tmp_path / "t.parquet"
     pq.write_table(pa.table({"a": pa.array([[0.0] * 50_000_000])}), path, compression="zstd")

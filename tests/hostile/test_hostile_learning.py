@@ -316,6 +316,7 @@ TABLES: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_that_no_build_writes(name: str, command: Command, tmp_path: Path) -> None:
