@@ -26,6 +26,7 @@ from generator.execution.build.receipts import RECEIPTS_FILE
 from generator.execution.lanes.options import OnImage
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, graphics_rotation, rotation_from_angles
 from generator.heads.placement import Placement
+from generator.heads.units import BY_EYES
 from generator.landmarks.anchors import Anchors
 from generator.landmarks.topology import FACE_MESH
 from generator.messages import HeadFacts, LaneOrder, Placed, PlaceOrder, Receipt
@@ -129,6 +130,24 @@ def test_what_was_noted_about_a_head_is_held_against_its_anchors(
     again = Levelled()
     dry.build(poses=CANONICAL, lanes=again)
     assert not again.placed, "and what was found then is kept"
+
+
+class InNoUnit(Levelled):
+    """Scales every head by its eyes."""
+
+    def _receipt(self, order: LaneOrder, on_image: OnImage) -> Receipt:
+        receipt = super()._receipt(order, on_image)
+        if isinstance(receipt, Placed):
+            scaled = replace(receipt.placement, units=BY_EYES, mm_per_unit=37.5)
+            receipt = replace(receipt, placement=scaled)
+        return receipt
+
+
+def test_heads_in_no_unit_are_not_looked_at_again(dry: DryBuild) -> None:
+    dry.build(lanes=InNoUnit())
+    again = InNoUnit()
+    dry.build(lanes=again)
+    assert not again.placed and not again.built
 
 
 class Lying(Levelled):
