@@ -10,9 +10,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
+from generator.dataset.format.build_files import LOG_FILE
 from generator.escape import printable
-
-LOG_FILE = "build.log"
 
 
 class Progress(Protocol):

@@ -9,6 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
+from generator.dataset.format.build_files import (
+    FIRST_PLACED_FILE,
+    LOG_FILE,
+    PLACED_FILE,
+    RECEIPTS_FILE,
+)
 from generator.dataset.format.digest import add_digests
 from generator.dataset.format.files import write_atomically
 from generator.dataset.format.folders import folder_beside, share_files
@@ -34,7 +40,7 @@ TARGET_BYTES = 256 * 10**6
 
 _MERGED = (
     *("data", MANIFEST_FILE, CONFIG_FILE),
-    *("receipts.jsonl", "placed.jsonl", "prepared.jsonl", "build.log"),
+    *(RECEIPTS_FILE, PLACED_FILE, FIRST_PLACED_FILE, LOG_FILE),
 )
 """What of a dataset's folder is written anew, or belongs to its build: the new one cannot be built on."""
 

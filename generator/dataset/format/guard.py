@@ -8,7 +8,7 @@ opened through a link that leaves its folder.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,9 +20,8 @@ from generator.errors import DatasetError
 from generator.escape import quoted
 from generator.names import as_inside_path, as_name, inside
 
-_remembered = lru_cache(maxsize=2**16)
-_CHECKS: dict[str, Callable[[str], object]] = {"name": _remembered(as_name), "path": _remembered(as_name)}
-"""What each text, or each piece of a path, has to be. The same poses come back with every head."""
+_as_name = lru_cache(maxsize=2**16)(as_name)
+"""The same poses come back with every head."""
 
 
 def check_texts(batch: pa.RecordBatch | pa.Table, where: object) -> None:
@@ -40,14 +39,14 @@ def check_texts(batch: pa.RecordBatch | pa.Table, where: object) -> None:
         if guard == "path" and ROWS[name].default == "":
             column = pc.filter(column, pc.not_equal(column, ""))
         texts = pc.list_flatten(pc.split_pattern(column, "/")) if guard == "path" else column
-        _check(name, pc.unique(texts).to_pylist(), _CHECKS[guard], where)
+        _check(name, pc.unique(texts).to_pylist(), where)
 
 
 def check_head_texts(heads: Iterable[tuple[str, str, str]], where: object) -> None:
     """The same for (subject, expression, split) of a table of heads."""
     for values in heads:
         for what, text in zip(("subject", "expression", "split"), values, strict=True):
-            _check(what, [text], _CHECKS["name"], where)
+            _check(what, [text], where)
 
 
 def dataset_file(root: Path, path: str) -> Path:
@@ -63,10 +62,10 @@ def dataset_file(root: Path, path: str) -> Path:
         ) from error
 
 
-def _check(what: str, texts: Iterable[str], check: Callable[[str], object], where: object) -> None:
+def _check(what: str, texts: Iterable[str], where: object) -> None:
     for text in texts:
         try:
-            check(text)
+            _as_name(text)
         except ValueError as error:
             raise DatasetError(
                 f"{where}: {what} {quoted(str(text))} {error}; this dataset was made or changed by something "

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from generator.dataset.format.anchors_table import ANCHORS_FILE
+from generator.dataset.format.build_files import FIRST_PLACED_FILE, PLACED_FILE, RECEIPTS_FILE
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HEADS_FILE
@@ -18,8 +19,7 @@ from generator.dataset.format.part_info import PartInfo
 from generator.dataset.show.card import CARD_FILE
 from generator.errors import DatasetError
 from generator.execution.build.lock import LOCK_FILE
-from generator.execution.build.placed_heads import FIRST_PLACED_FILE, PLACED_FILE
-from generator.execution.build.receipts import RECEIPTS_FILE, Receipts
+from generator.execution.build.receipts import Receipts
 from generator.execution.status import LOG_FILE
 from generator.heads.head import SkippedHead
 from generator.messages import BuildOrder

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from generator import registries
 from generator.content import deciding
+from generator.dataset.format.build_files import PLACED_FILE
 from generator.dataset.format.files import append_line
 from generator.errors import DatasetError, HeadturnError, WorkerError
 from generator.execution.executors.executor import Executor
@@ -20,10 +21,6 @@ from generator.landmarks.facing import levelling_problem
 from generator.messages import Placed, PlaceOrder, Versions, VersionsOrder, expect, from_json, to_json
 from generator.plan.settings import Landmarks
 from generator.sealed import read_sealed_lines, sealed_line
-
-PLACED_FILE = "placed.jsonl"
-FIRST_PLACED_FILE = "prepared.jsonl"
-"""As the first release called it."""
 
 
 def lane_versions(executor: Executor, landmarks: Landmarks) -> dict[str, str]:

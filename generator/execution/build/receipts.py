@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from generator.codec import from_plain
+from generator.dataset.format.build_files import RECEIPTS_FILE
 from generator.dataset.format.files import append_line, write_bytes
 from generator.dataset.format.part import PartInfo, check_part
 from generator.errors import DatasetError
 from generator.execution.build.unit_check import check_unit, unit_files
 from generator.messages import BuildOrder
 from generator.sealed import read_sealed_lines, sealed_line
-
-RECEIPTS_FILE = "receipts.jsonl"
 
 Stamp = list[Any]
 """Size and time of change of a part, and one digest of those of its images and passes."""

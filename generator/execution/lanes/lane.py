@@ -21,6 +21,7 @@ import cv2
 import numpy as np
 
 from generator.content import content_versions
+from generator.dataset.format.build_files import PLACED_FILE
 from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
@@ -156,7 +157,7 @@ class Lane:
             if off := self._surface.off(order.anchors):
                 raise HeadError(
                     f"{order.head.mesh_path}: {off} of its anchors are not on its surface: what an earlier "
-                    "run noted about it was changed; delete placed.jsonl and run the build again"
+                    f"run noted about it was changed; delete {PLACED_FILE} and run the build again"
                 )
             visible = self._surface.visible(order.anchors, views)
         topology = detector.topology

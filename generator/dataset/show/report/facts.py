@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from generator.dataset.format.build_files import LOG_FILE
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest
 from generator.dataset.show.report.atlas import Atlas
 from generator.errors import DatasetError
 from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
 
-LOG_FILE = "build.log"
 MAX_SECONDS = 1e9
 """Of a stage of a unit; more was not measured."""
 MAX_STAGES = 64
