@@ -16,6 +16,7 @@ from generator.errors import HeadError, UsageError
 from generator.heads.card import CARD_NAME, MAX_CARD_BYTES
 from generator.heads.head import NEUTRAL, Made, Maker, Wish
 from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
+from generator.heads.parametric.atlas import head_atlas
 from generator.heads.parametric.compose import HeadShape, head_shape, head_vertices
 from generator.heads.parametric.curtain import paint_curtain
 from generator.heads.parametric.expression import NEUTRAL_EXPRESSION, Expression, sample_expression
@@ -125,7 +126,7 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
         write_mesh(work / f"{name}.obj", head_vertices(shape, expression), long_hair)
         described[name] = _describe_expression(f"{name}.obj", expression)
     write_materials(work, np.minimum(hair_tone(appearance) * 0.6, 0.12), long_hair)
-    write_texture(work / "skin.png", paint_skin(appearance, paint))
+    write_texture(work / "skin.png", paint_skin(head_atlas(), appearance, paint))
     write_texture(work / "eye.png", paint_eye(appearance, paint))
     if long_hair:
         write_texture(work / "hair.png", paint_curtain(appearance, paint))

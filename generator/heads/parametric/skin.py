@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from generator.heads.parametric.appearance import Appearance, hair_tone, skin_tone
-from generator.heads.parametric.atlas import ATLAS_SIZE, Atlas, head_atlas
+from generator.heads.parametric.atlas import ATLAS_SIZE, Atlas
 from generator.heads.parametric.hair import paint_hair
 from generator.heads.parametric.noise import smooth_noise, smoothstep
 
@@ -22,9 +22,8 @@ _BROW_LEAN = np.deg2rad([80, 62, 35, 12, -12, -30])
 _BROW_INNER, _BROW_LENGTH = 0.105, 0.43
 
 
-def paint_skin(look: Appearance, rng: np.random.Generator) -> np.ndarray:
-    """skin.png as sRGB uint8 [ATLAS_SIZE, ATLAS_SIZE, 3]."""
-    atlas = head_atlas()
+def paint_skin(atlas: Atlas, look: Appearance, rng: np.random.Generator) -> np.ndarray:
+    """skin.png as sRGB uint8 [ATLAS_SIZE, ATLAS_SIZE, 3]. atlas: of any mesh of a head."""
     tone = skin_tone(look.melanin).astype(np.float32)
     color = _complexion(atlas, look, tone, rng)
     _spots(color, atlas, look, rng)
