@@ -244,7 +244,7 @@ def test_a_failed_write_leaves_no_head(monkeypatch: pytest.MonkeyPatch, tmp_path
     def full_disk(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(folder.Image.Image, "save", full_disk)
+    monkeypatch.setattr(folder, "png_bytes", full_disk)
     with pytest.raises(HeadError, match="No space left"):
         make_heads(tmp_path, count=1, seed=0)
     assert not (tmp_path / "s0p0000").exists()

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from generator.heads.parametric.appearance import EYE_COLORS, Appearance
-from generator.heads.parametric.noise import smooth_noise, smoothstep
+from generator.heads.parametric.noise import NoiseField, smoothstep
 
 EYE_SIZE = 256
 """Texels along each side of eye.png."""
@@ -78,30 +79,52 @@ def _unit_eye() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return vertices, np.array(triangles, dtype=np.int32), uv
 
 
+class _Front(NamedTuple):
+    """The eye seen from the front, [EYE_SIZE * EYE_SIZE]: what all eyes have in common there."""
+
+    radius: np.ndarray  # 1 at the limbus
+    sides: np.ndarray
+    lid: np.ndarray
+    glint: np.ndarray
+    vein: np.ndarray
+    veins: NoiseField
+    fibres: NoiseField
+
+
+@lru_cache(maxsize=1)
+def _front() -> _Front:
+    axis = ((np.arange(EYE_SIZE) + 0.5) / EYE_SIZE * 2 - 1).astype(np.float32)
+    x, y = (np.float32(_SPAN / IRIS_ANGLE) * plane.ravel() for plane in np.meshgrid(axis, -axis))
+    radius, turn = np.hypot(x, y), np.arctan2(y, x)
+    return _Front(
+        radius=radius,
+        sides=1 - 0.25 * smoothstep(1.2, 2.6, np.abs(x)),
+        # The upper lid throws a shadow; a window is mirrored in the cornea.
+        lid=1 - 0.30 * smoothstep(0.25, 1.1, y),
+        glint=0.9 * smoothstep(0.20, 0.13, np.hypot(x + 0.36, y - 0.20)),
+        vein=smoothstep(1.2, 2.6, radius),
+        veins=NoiseField(turn * 8, radius * 1.5),
+        fibres=NoiseField((turn + np.pi) * 16 / np.pi, radius * 1.2),
+    )
+
+
 def paint_eye(look: Appearance, rng: np.random.Generator) -> np.ndarray:
     """The eye seen from the front, azimuthal equidistant, sRGB uint8 [EYE_SIZE, EYE_SIZE, 3]."""
-    axis = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE * 2 - 1
-    x, y = np.meshgrid(axis, -axis)
-    radius = np.hypot(x, y) * _SPAN / IRIS_ANGLE  # 1 at the limbus
-    turn = np.arctan2(y, x)
-
+    front = _front()
     white = np.array([0.90, 0.875, 0.85]) - 0.05 * look.ageing * np.array([0.2, 0.5, 1.0])
-    veins = smooth_noise(rng, (turn * 8, radius * 1.5)) * smoothstep(1.2, 2.6, radius)
-    color = white - (0.03 + 0.05 * np.maximum(veins, 0))[..., None] * np.array([0.3, 1.0, 1.0])
-    color = color * (1 - 0.25 * smoothstep(1.2, 2.6, np.abs(x) * _SPAN / IRIS_ANGLE))[..., None]
-
+    veins = 0.03 + 0.05 * np.maximum(front.veins.draw(rng) * front.vein, 0)
     iris = np.array(EYE_COLORS[look.eye_color]) * rng.uniform(0.85, 1.15)
-    fibres = smooth_noise(rng, ((turn + np.pi) * 16 / np.pi, radius * 1.2))
-    ring = 0.75 + 0.45 * smoothstep(0.95, 0.45, radius) + 0.22 * fibres
-    inner = iris * ring[..., None]
-    inner += (smoothstep(0.62, 0.42, radius) * 0.10)[..., None] * np.array([1.0, 0.6, 0.25])
-    inner *= (1 - 0.62 * smoothstep(0.78, 1.0, radius))[..., None]
-    color += (inner - color) * smoothstep(1.05, 0.95, radius)[..., None]
+    ring = 0.75 + 0.45 * smoothstep(0.95, 0.45, front.radius) + 0.22 * front.fibres.draw(rng)
+    glow = 0.10 * smoothstep(0.62, 0.42, front.radius)
+    limbus = 1 - 0.62 * smoothstep(0.78, 1.0, front.radius)
+    share = smoothstep(1.05, 0.95, front.radius)
     pupil = rng.uniform(0.34, 0.46)
-    color *= 1 - 0.97 * smoothstep(pupil + 0.05, pupil - 0.03, radius)[..., None]
-
-    # The upper lid throws a shadow; a window is mirrored in the cornea.
-    color *= (1 - 0.30 * smoothstep(0.25, 1.1, y * _SPAN / IRIS_ANGLE))[..., None]
-    glint = smoothstep(0.20, 0.13, np.hypot(x * _SPAN / IRIS_ANGLE + 0.36, y * _SPAN / IRIS_ANGLE - 0.20))
-    color += (np.array([1.0, 1.0, 1.0]) - color) * 0.9 * glint[..., None]
-    return (np.clip(color, 0, 1) * 255 + 0.5).astype(np.uint8)
+    shade = (1 - 0.97 * smoothstep(pupil + 0.05, pupil - 0.03, front.radius)) * front.lid
+    picture = np.empty((EYE_SIZE * EYE_SIZE, 3), dtype=np.uint8)
+    for k, (red, warm) in enumerate(zip((0.3, 1.0, 1.0), (1.0, 0.6, 0.25), strict=True)):
+        plane = (np.float32(white[k]) - np.float32(red) * veins) * front.sides
+        plane += ((np.float32(iris[k]) * ring + np.float32(warm) * glow) * limbus - plane) * share
+        plane *= shade
+        plane += (1 - plane) * front.glint
+        picture[:, k] = np.clip(plane, 0, 1) * 255 + 0.5
+    return picture.reshape(EYE_SIZE, EYE_SIZE, 3)

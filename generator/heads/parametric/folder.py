@@ -8,10 +8,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from generator.heads.parametric.curtain import curtain_topology
 from generator.heads.parametric.eyes import eyeball_topology
+from generator.heads.parametric.png import png_bytes
 from generator.heads.parametric.template import PARTS, head_template
 from generator.sealed import sealed
 
@@ -35,8 +35,8 @@ map_Kd hair.png
 
 def write_mesh(path: Path, vertices: np.ndarray, long_hair: bool) -> None:
     """Write vertices [N, 3] in mm with their triangles as OBJ (micrometres kept)."""
-    lines = "".join(f"v {x:.3f} {y:.3f} {z:.3f}\n" for x, y, z in vertices.tolist())
-    path.write_text(f"mtllib {MATERIAL_FILE}\n{lines}{_topology(long_hair)}", encoding="ascii", newline="\n")
+    lines = b"v %.3f %.3f %.3f\n" * len(vertices) % tuple(vertices.ravel().tolist())
+    path.write_bytes(b"mtllib %s\n" % MATERIAL_FILE.encode() + lines + _topology(long_hair))
 
 
 def write_materials(folder: Path, lash_color: np.ndarray, long_hair: bool) -> None:
@@ -47,7 +47,7 @@ def write_materials(folder: Path, lash_color: np.ndarray, long_hair: bool) -> No
 
 def write_texture(path: Path, pixels: np.ndarray) -> None:
     """Write uint8 [H, W, 3] as PNG without any metadata."""
-    Image.fromarray(pixels).save(path, format="PNG", compress_level=2)
+    path.write_bytes(png_bytes(pixels))
 
 
 def write_description(path: Path, description: dict) -> None:
@@ -77,7 +77,7 @@ def head_triangles(long_hair: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @lru_cache(maxsize=2)
-def _topology(long_hair: bool) -> str:
+def _topology(long_hair: bool) -> bytes:
     """The part of the OBJ that all heads share."""
     triangles, corners, names = head_triangles(long_hair)
     uv = [head_template().uv, eyeball_topology()[1]] + ([curtain_topology()[1]] if long_hair else [])
@@ -88,4 +88,4 @@ def _topology(long_hair: bool) -> str:
         if rows:
             text.append(f"usemtl {name}\n")
             text += [f"f {a}/{au} {b}/{bu} {c}/{cu}\n" for a, au, b, bu, c, cu in rows]
-    return "".join(text)
+    return "".join(text).encode("ascii")

@@ -201,12 +201,18 @@ def base_vertices() -> np.ndarray:
 @cache
 def head_target(name: str) -> tuple[np.ndarray, np.ndarray]:
     """A target cut to the head: rows in source numbering [K], offsets [K, 3] dm."""
-    lookup = np.full(len(base_mesh().vertices), -1)
+    lookup, written = _head_numbers()
+    indices, offsets = target(name, written)
+    return lookup[indices], offsets
+
+
+@lru_cache(maxsize=1)
+def _head_numbers() -> tuple[np.ndarray, frozenset[str]]:
+    """Number of a vertex of the base mesh in source numbering; the numbers that have one, as written."""
     source = head_template().source_vertices
+    lookup = np.full(len(base_mesh().vertices), -1)
     lookup[source] = np.arange(len(source))
-    indices, offsets = target(name)
-    rows = lookup[indices]
-    return rows[rows >= 0], offsets[rows >= 0]
+    return lookup, frozenset(map(str, source.tolist()))
 
 
 def parameter_table() -> list[tuple[str, str, str]]:

@@ -78,17 +78,20 @@ def base_mesh() -> BaseMesh:
     )
 
 
-def target(name: str) -> tuple[np.ndarray, np.ndarray]:
+def target(name: str, among: frozenset[str] | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Vertex indices int64 [K] and offsets float64 [K, 3], decimetres, of one target.
 
     name: path below ``mpfb2/targets`` without suffix, or ``unit:NAME`` for one
         of the ARKit-style face units.
+    among: numbers of the vertices that matter, as they are written; others are not even parsed.
     """
     if name.startswith("unit:"):
         text = _read(f"{FACE_UNITS}/{name.removeprefix('unit:')}.target")
     else:
         text = _read(f"{TARGETS}/{name}.target.gz")
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    if among is not None:
+        lines = [line for line in lines if line.split(None, 1)[0] in among]
     rows = np.array(" ".join(lines).split(), dtype=np.float64).reshape(-1, 4)
     return rows[:, 0].astype(np.int64), rows[:, 1:]
 
