@@ -13,6 +13,7 @@ from rich.table import Table
 
 from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out, say, shown
 from generator.cli.reporter import TerminalReporter
+from generator.limits import MAX_WORKERS
 from generator.plan.settings import Heads
 
 heads_app = typer.Typer(help="Make parametric heads, or look at a head source.", no_args_is_help=True)
@@ -28,6 +29,9 @@ def heads_make(
     expressions: Annotated[
         int, typer.Option(help="Sampled expressions each, besides the neutral face.")
     ] = Heads.sampled_expressions,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=MAX_WORKERS, help="Processes; default one a core where it pays.")
+    ] = None,
 ) -> None:
     """Compose parametric heads from MakeHuman's CC0 data, as OBJ folders."""
     from generator.heads.parametric.make import make_heads
@@ -35,7 +39,12 @@ def heads_make(
     with TerminalReporter(err) as reporter:
         reporter.stage("making heads", count)
         made = make_heads(
-            folder, count=count, seed=seed, expressions=expressions, progress=lambda _: reporter.advance()
+            folder,
+            count=count,
+            seed=seed,
+            expressions=expressions,
+            progress=lambda _: reporter.advance(),
+            workers=workers,
         )
     command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
     say(f"{len(made)} heads in {folder}; build with: {command}")

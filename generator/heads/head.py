@@ -92,12 +92,16 @@ class Made:
 
 @dataclass(frozen=True)
 class Wish:
-    """Which heads are to be made. argument: what stands behind the maker's name, such as a path."""
+    """Which heads are to be made. argument: what stands behind the maker's name, such as a path.
+
+    workers: processes that may make them; None for one a core.
+    """
 
     argument: str
     count: int
     seed: int
     sampled_expressions: int
+    workers: int | None = None
 
 
 @dataclass(frozen=True)

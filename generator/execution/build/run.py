@@ -138,7 +138,7 @@ def _build(
     confirm: Confirm,
     lock: Lock,
 ) -> BuildResult:
-    source = find_source(config, root, reporter)
+    source = find_source(config, root, reporter, executor.workers)
     versions = lane_versions(executor, config.landmarks)
     recorded_versions = versions_of_parts(root)
     planned, skipped = place_heads(source, config, versions, root, executor, reporter)

@@ -14,8 +14,11 @@ from generator.heads.source import find_heads
 from generator.plan.config import BuildConfig
 
 
-def find_source(config: BuildConfig, root: Path, reporter: Progress) -> HeadSource:
-    """The heads the configuration names; those made on the spot are made in root/heads first.
+def find_source(
+    config: BuildConfig, root: Path, reporter: Progress, workers: int | None = None
+) -> HeadSource:
+    """The heads the configuration names; those made on the spot are made in root/heads first,
+    by as many processes as workers says; None for one a core.
 
     Raises UsageError if there is none, or a chosen subject does not exist.
     """
@@ -23,7 +26,7 @@ def find_source(config: BuildConfig, root: Path, reporter: Progress) -> HeadSour
     subjects, expressions = heads.subjects, heads.expressions
     path = source_path(config, root)
     if config.makes_heads:
-        made = _make(config, path, reporter)
+        made = _make(config, path, reporter, workers)
         # The folder may hold more than are asked for now.
         subjects, expressions = subjects or made.subjects, expressions or made.expressions
     source = find_heads(
@@ -55,10 +58,10 @@ def source_path(config: BuildConfig, root: Path) -> Path:
     return root / MADE_HEADS if config.makes_heads else config.located(config.heads.source)
 
 
-def _make(config: BuildConfig, path: Path, reporter: Progress) -> Made:
+def _make(config: BuildConfig, path: Path, reporter: Progress, workers: int | None) -> Made:
     heads = config.heads
     name, _, argument = heads.source.partition(":")
     maker: Maker = registries.HEAD_MAKERS.get(name)
     reporter.stage("making heads", heads.count)
-    wish = Wish(argument, heads.count, heads.seed, heads.sampled_expressions)
+    wish = Wish(argument, heads.count, heads.seed, heads.sampled_expressions, workers)
     return maker.make(path, wish, reporter.advance)

@@ -6,13 +6,15 @@ from __future__ import annotations
 import hashlib
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from generator.errors import HeadError, UsageError
+from generator.cgroup import worthwhile
+from generator.errors import HeadError, UsageError, WorkerError
 from generator.heads.card import CARD_NAME, MAX_CARD_BYTES
 from generator.heads.head import NEUTRAL, Made, Maker, Wish
 from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
@@ -26,6 +28,8 @@ from generator.heads.parametric.identity import Identity, sample_identity
 from generator.heads.parametric.skin import paint_skin
 from generator.heads.parametric.source import data_folder
 from generator.limits import MAX_HEADS, MAX_SEED
+from generator.pool import processes
+from generator.process import available_cores
 from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
 from generator.sealed import SEAL, unsealed
 
@@ -36,6 +40,9 @@ ATTRIBUTION = (
 )
 FILES = "files"
 """Of head.json: SHA-256 of every file beside it."""
+
+HEADS_A_WORKER = 12
+"""A further process, which works out anew what heads have in common, pays from so many heads on."""
 
 _HEAD_NAME = re.compile(r"s\d+p\d{4,}")
 
@@ -48,25 +55,28 @@ def make_heads(
     expressions: int = 0,
     progress: Callable[[str], None] | None = None,
     keep: bool = False,
+    workers: int | None = None,
 ) -> list[Path]:
     """Write heads ``s<seed>p0000`` ... below out and return their folders.
 
     Head k of a seed is the same whatever count is, and so is expression j of a
-    head whatever expressions is. A folder is complete or absent: each is written
-    beside its place and renamed. Folders that are already there are replaced,
-    or kept if keep is set, they hold the expressions asked for, and their files are as they were made.
+    head whatever expressions is; how many processes are at work changes nothing.
+    A folder is complete or absent: each is written beside its place and renamed. Folders
+    that are already there are replaced, or kept if keep is set, they hold the expressions
+    asked for, and their files are as they were made.
 
     Parameters
     ----------
     out: made if missing; may hold earlier parametric heads and nothing else.
     count: number of identities, at least 1. seed: 0 or larger.
     expressions: sampled expressions an identity besides the neutral one.
-    progress: called with the name of every head once it is written.
+    progress: called with the name of every head once it is there.
+    workers: processes at most; default one a core, where there is enough to do.
 
     Raises
     ------
     UsageError: a number is out of range, or out holds something else.
-    HeadError: the data are not installed, or a file cannot be written.
+    HeadError: the data are not installed, a file cannot be written, or a process was killed.
     """
     if count < 1:
         raise UsageError(f"count is {count}: ask for at least 1 head")
@@ -78,19 +88,49 @@ def make_heads(
         raise UsageError(f"{count} heads with {expressions} expressions each: more than {MAX_HEADS:,} meshes")
     data_folder()
     _prepare(out)
-    folders = []
-    for index in range(count):
-        folder = out / head_name(seed, index)
-        try:
-            if not (keep and _is_whole(folder, expression_name(expressions) if expressions else NEUTRAL)):
-                _write_head(folder, seed, index, expressions)
-        except OSError as error:
-            reason = f"cannot be written ({error.strerror}); check space and permissions"
-            raise HeadError(f"{folder}: {reason}") from error
-        folders.append(folder)
-        if progress is not None:
+    last = expression_name(expressions) if expressions else NEUTRAL
+    folders = [out / head_name(seed, index) for index in range(count)]
+    missing = []
+    for index, folder in enumerate(folders):
+        if not (keep and _is_whole(folder, last)):
+            missing.append(index)
+        elif progress is not None:
             progress(folder.name)
+    for name in _spread(partial(_make_head, out, seed, expressions), missing, workers):
+        if progress is not None:
+            progress(name)
     return folders
+
+
+def _spread(make: Callable[[int], str], missing: list[int], workers: int | None) -> Iterator[str]:
+    """The names of the heads of these numbers, in their order, each as soon as it is there."""
+    enough = 1 + len(missing) // HEADS_A_WORKER
+    workers = min(workers or enough, worthwhile(available_cores()), enough)
+    if workers < 2:
+        yield from map(make, missing)
+        return
+    try:
+        with processes(workers, _prepare_process) as spread:
+            yield from spread(make, missing, 1)
+    except WorkerError as error:
+        raise HeadError(
+            "a process that was making heads was killed, perhaps for memory; the heads that are there are "
+            "whole. Run it again with --workers 1"
+        ) from error
+
+
+def _prepare_process() -> None:
+    head_atlas()
+
+
+def _make_head(out: Path, seed: int, expressions: int, index: int) -> str:
+    folder = out / head_name(seed, index)
+    try:
+        _write_head(folder, seed, index, expressions)
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror}); check space and permissions"
+        raise HeadError(f"{folder}: {reason}") from error
+    return folder.name
 
 
 def head_name(seed: int, index: int) -> str:
@@ -111,11 +151,22 @@ def sample_head(seed: int, index: int) -> tuple[Identity, Appearance, HeadShape]
 
 
 def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
-    identity, appearance, shape = sample_head(seed, index)
-    paint = np.random.default_rng([seed, index, 3])
     work = folder.with_name(f".{folder.name}.tmp")
     shutil.rmtree(work, ignore_errors=True)
-    work.mkdir()
+    try:
+        work.mkdir()
+        _fill(work, folder.name, seed, index, expressions)
+        if folder.exists():
+            shutil.rmtree(folder)
+        work.rename(folder)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _fill(work: Path, subject: str, seed: int, index: int, expressions: int) -> None:
+    """Write all files of a head into a folder."""
+    identity, appearance, shape = sample_head(seed, index)
+    paint = np.random.default_rng([seed, index, 3])
     long_hair = shape.curtain is not None
     described = {}
     for number in range(expressions + 1):
@@ -135,7 +186,7 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
         work / CARD_NAME,
         {
             "source": "parametric",
-            "subject": folder.name,
+            "subject": subject,
             "license": LICENSE,
             "redistributable": True,
             "attribution": ATTRIBUTION,
@@ -153,9 +204,6 @@ def _write_head(folder: Path, seed: int, index: int, expressions: int) -> None:
             FILES: made,
         },
     )
-    if folder.exists():
-        shutil.rmtree(folder)
-    work.rename(folder)
 
 
 def _is_whole(folder: Path, last: str) -> bool:
@@ -206,6 +254,7 @@ def _make(folder: Path, wish: Wish, made: Callable[[], None]) -> Made:
         expressions=wish.sampled_expressions,
         progress=lambda _: made(),
         keep=True,
+        workers=wish.workers,
     )
     sampled = (expression_name(number) for number in range(1, wish.sampled_expressions + 1))
     return Made(tuple(head_name(wish.seed, k) for k in range(wish.count)), (NEUTRAL, *sampled))
