@@ -17,6 +17,7 @@ from generator.dataset.format.part_info import PartInfo
 from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors
+from generator.landmarks.shared import SharedAnchors
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 
@@ -92,11 +93,25 @@ class VersionsOrder:
 class PlaceOrder:
     """Find the face of a subject and anchor its landmarks.
 
-    heads: of one subject, the one that decides pose zero first. frame: see Placement.
+    heads: of one subject, the one that decides pose zero first. frame: see Placement. shared: anchors of
+    topologies that this dataset's heads have in common, besides those of the package.
     """
 
     heads: tuple[Head, ...]
     frame: str
+    landmarks: Landmarks = field(default_factory=Landmarks)
+    shared: tuple[SharedAnchors, ...] = ()
+
+
+@dataclass(frozen=True)
+class ShareOrder:
+    """Find the anchors of every topology that two or more heads have in common.
+
+    heads: one a subject. placed: what placing each alone found.
+    """
+
+    heads: tuple[Head, ...]
+    placed: tuple[Placed, ...]
     landmarks: Landmarks = field(default_factory=Landmarks)
 
 
@@ -104,8 +119,7 @@ class PlaceOrder:
 class BuildOrder:
     """Render one unit, a head at some views; detect, and commit its part.
 
-    unit: its name. earlier_units: names it had when its poses had another place in the grid, or under
-        the first release.
+    unit: its name. earlier_units: names it had when its poses had another place in the grid.
     root: the dataset. indices: place of each view's pose in the grid.
     anchors: float64 [P, 3], frame C at the pose zero of the dataset, mm; NaN where there is none.
     configuration_digest: of what all parts of the dataset share.
@@ -184,6 +198,13 @@ class Placed:
 
 
 @dataclass(frozen=True)
+class Shared:
+    """The anchors of topologies, as a :class:`ShareOrder` wanted them."""
+
+    anchors: tuple[SharedAnchors, ...]
+
+
+@dataclass(frozen=True)
 class Built:
     """A unit was committed. seconds: of the lane, a stage. versions: as :class:`Versions`."""
 
@@ -201,15 +222,15 @@ class LaneFailed:
     log: str = ""
 
 
-LaneOrder = VersionsOrder | PlaceOrder | BuildOrder
-Receipt = Versions | Placed | Built
+LaneOrder = VersionsOrder | PlaceOrder | ShareOrder | BuildOrder
+Receipt = Versions | Placed | Shared | Built
 
 _KINDS: dict[str, type] = {
     kind.__name__: kind
     for kind in (
         *(RenderOrder, ConvertOrder, WorkerReady, Rendered, OrderDone, OrderFailed),
-        *(VersionsOrder, PlaceOrder, BuildOrder),
-        *(LaneReady, Progressed, Versions, Placed, Built, LaneFailed),
+        *(VersionsOrder, PlaceOrder, ShareOrder, BuildOrder),
+        *(LaneReady, Progressed, Versions, Placed, Shared, Built, LaneFailed),
     )
 }
 

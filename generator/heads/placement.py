@@ -21,8 +21,8 @@ class Placement:
     units, mm_per_unit, up, forward: of the source. pivot: in source units and
     axes. radius_mm: of the sphere about the pivot that holds the head.
     eye_distance_mm: between the outer eye corners. notes: what was guessed.
-    frame: "source" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
-    :meth:`normalise` only where frame is "canonical". turned_deg: yaw, pitch and roll of the face at
+    frame: "source", "level" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
+    :meth:`normalise` only where frame is not "source". turned_deg: yaw, pitch and roll of the face at
     pose zero of the source's axes, where it does not look along them.
     """
 
@@ -42,7 +42,7 @@ class Placement:
     @property
     def levelling(self) -> np.ndarray:
         """R_U [3, 3] that is applied before any pose: the correction, or nothing."""
-        return np.array(self.correction if self.frame == "canonical" else IDENTITY).reshape(3, 3)
+        return np.array(IDENTITY if self.frame == "source" else self.correction).reshape(3, 3)
 
     def normalise(self, mesh: HeadMesh) -> HeadMesh:
         """The mesh in frame U at the chosen pose zero, mm, pivot at the origin."""

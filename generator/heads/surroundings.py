@@ -34,8 +34,13 @@ def head_alone(mesh: HeadMesh, placement: Placement) -> HeadMesh:
     Which that is follows from the recorded pivot and radius, so that a replay leaves out the same.
     The very mesh where all of it belongs.
     """
-    kept = surroundings(mesh, np.array(placement.pivot), placement.radius_mm / placement.mm_per_unit)
+    kept = head_triangles(mesh, placement)
     return mesh if kept.all() else with_triangles(mesh, kept)
+
+
+def head_triangles(mesh: HeadMesh, placement: Placement) -> np.ndarray:
+    """Which triangles of a mesh as read :func:`head_alone` keeps, bool [T]."""
+    return surroundings(mesh, np.array(placement.pivot), placement.radius_mm / placement.mm_per_unit)
 
 
 def surroundings(mesh: HeadMesh, pivot: np.ndarray, radius: float) -> np.ndarray:

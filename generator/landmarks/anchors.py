@@ -14,6 +14,15 @@ WEIGHTS_SUM = 1e-9
 """How near to 1 the barycentric weights of an anchor add up."""
 
 
+WAYS = {
+    "package": "those of all heads of its topology, which come with the package",
+    "source": "those of all heads of its topology, found on the first of them in this dataset",
+    "subject": "those of another expression of its subject, with the same triangles",
+    "head": "found on this head alone",
+}
+"""Where anchors may come from."""
+
+
 @dataclass(frozen=True, eq=False)
 class Anchors:
     """The landmarks of a topology on one mesh; P of them.
@@ -28,6 +37,7 @@ class Anchors:
     residual_px  rms distance of the detections from the projected anchors, pixels
     residual_mm  median distance of the hits from the anchors: towards the silhouette a pixel is
                  centimetres deep, and their mean would tell of nothing else
+    way          a key of WAYS: where they come from
     """
 
     triangles: np.ndarray
@@ -37,6 +47,7 @@ class Anchors:
     off: int = 0
     residual_px: float = float("nan")
     residual_mm: float = float("nan")
+    way: str = "head"
 
     @property
     def absent(self) -> int:
@@ -60,7 +71,7 @@ class Anchors:
             return "an anchor has a triangle and no place, or a place and no triangle"
         if (np.abs(self.weights[there].sum(axis=1) - 1) > WEIGHTS_SUM).any():
             return "the weights of an anchor do not add up to 1"
-        return ""
+        return "" if self.way in WAYS else f"its anchors come from {self.way!r}, which is no way to find them"
 
     def asymmetry_mm(self, topology: Topology) -> float:
         """Rms distance of each anchor from the mirror image of its partner, after a rigid fit."""

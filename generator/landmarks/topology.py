@@ -60,6 +60,9 @@ class Topology:
     parts: name of a part of the face -> places of its points; the whole face need not be named.
     ibug_68: the 68 points of iBUG 300-W among them, or None where there is no such choice.
     reference_csv, surface_csv: files of this package, see :meth:`reference_face`, :meth:`surface_face`.
+    level_pitch_deg: pitch of the reference face as a rigid fit of the detector's own model face reads
+        it: where that fit reads zero is pose zero "level".
+    packaged_anchors: files of this package, see :mod:`generator.landmarks.shared`.
     """
 
     name: str
@@ -72,6 +75,8 @@ class Topology:
     ibug_68: PointSubset | None = None
     reference_csv: str = ""
     surface_csv: str = ""
+    level_pitch_deg: float = 0.0
+    packaged_anchors: tuple[str, ...] = ()
 
     @cached_property
     def regions(self) -> dict[str, np.ndarray]:
@@ -179,5 +184,8 @@ FACE_MESH = Topology(
     # on 24 parametric heads: scripts/make_reference_face.py rebuilds both files.
     reference_csv="reference_face.csv",
     surface_csv="surface_face.csv",
+    # MediaPipe's canonical face fitted to reference_face.csv; scripts/make_reference_face.py prints it.
+    level_pitch_deg=-4.784,
+    packaged_anchors=("parametric_anchors.csv",),
 )
 """MediaPipe Face Mesh, without the points of the irises."""

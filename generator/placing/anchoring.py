@@ -10,7 +10,7 @@ import numpy as np
 
 from generator.errors import HeadError
 from generator.geometry.camera import SENSOR_MM, Camera
-from generator.geometry.rotation import angles_from_rotation, rotation_from_angles
+from generator.geometry.rotation import angles_from_rotation, graphics_rotation, rotation_from_angles
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
@@ -18,8 +18,10 @@ from generator.heads.placement import STRAIGHT, Placement
 from generator.heads.surroundings import head_alone
 from generator.landmarks.anchors import Anchors, no_anchors
 from generator.landmarks.detector import Detector
+from generator.landmarks.facing import facing
 from generator.landmarks.surface import Surface
-from generator.placing.anchors import Sighting, cast_views, find_anchors
+from generator.landmarks.topology import Topology
+from generator.placing.anchors import Sighting, find_anchors
 from generator.placing.levelling import Levelling, level
 from generator.placing.rendering import HeadRenderer, read_image
 from generator.plan.settings import Look
@@ -31,8 +33,13 @@ POSES: tuple[Pose, ...] = (
 """(yaw, pitch, roll) of the views, degrees: near the front, where the detector is at its best,
 and spread, because its errors there change with the pose."""
 
-PIXELS, LENS_MM = 384, 200.0
+PIXELS, LENS_MM = 384, 400.0
+"""From three metres: a detector reads a face that is nearer some degrees lower."""
 LOOK = Look(samples=2, light_yaw_deg=0.0, light_pitch_deg=20.0, ambient=0.5)
+
+CANONICAL_SD_DEG = (0.3, 3.2, 0.1)
+"""Standard deviation of yaw, pitch and roll of frame "canonical" over heads whose axes agree: it is the fit
+of a mean face to each head's own anchors, and a profile leaves open where its pitch is zero."""
 
 WINDOW = 3.0
 """Side of the views at the pivot, in outer-eye distances."""
@@ -67,13 +74,13 @@ def anchor_views(
         rotation = rotation_from_angles(np.array(angles, dtype=np.float64))
         found = detector.detect(image)
         if found is not None:
-            sightings.append(Sighting(rotation, found[:, :2].astype(np.float64)))
+            sightings.append(Sighting(rotation, found.astype(np.float64)))
         # A network has a better and a worse side; a face and its mirror image together do not.
         mirrored = detector.detect(np.ascontiguousarray(image[:, ::-1]))
         if mirrored is not None:
-            pixels = mirrored[pairs, :2].astype(np.float64)
-            pixels[:, 0] = camera.width - pixels[:, 0]
-            sightings.append(Sighting(rotation, pixels))
+            landmarks = mirrored[pairs].astype(np.float64)
+            landmarks[:, 0] = camera.width - landmarks[:, 0]
+            sightings.append(Sighting(rotation, landmarks))
     return sightings
 
 
@@ -99,24 +106,31 @@ def anchor_head(
     views = anchor_views(placed, camera, renderer, detector, scratch, placement.turned_deg)
     if not views:
         return no_anchors(detector.topology), None
-    surface = Surface(placed)
-    anchors = find_anchors(surface, views, camera, detector.topology)
-    return anchors, level(anchors.points, cast_views(surface, views, camera), detector.topology)
+    anchors = find_anchors(Surface(placed), views, camera, detector.topology)
+    return anchors, level(views, detector.topology)
 
 
-def level_head(head: Head, placement: Placement, levelling: Levelling | None, frame: str) -> Placement:
-    """A placement with pose zero. HeadError if frame is "canonical" and there is none."""
+def level_head(
+    head: Head, placement: Placement, anchors: Anchors, levelling: Levelling | None, topology: Topology
+) -> Placement:
+    """A placement with the pose zero of its frame; see docs/truth.md.
+
+    anchors: of the head that decides for its subject. Raises HeadError where the head cannot be levelled
+    though its frame asks for it.
+    """
+    if placement.frame == "canonical":
+        face = facing(anchors.points, topology)
+        levelling = None if face is None else Levelling(graphics_rotation(face.T), np.array(CANONICAL_SD_DEG))
     if levelling is None:
-        if frame == "canonical":
+        if placement.frame != "source":
             raise HeadError(
                 f"{head.mesh_path}: cannot be levelled: too few landmarks found a place on the mesh; "
                 'use frame = "source" or a mesh that shows the whole face'
             )
-        return replace(placement, frame=frame)
+        return placement
     return replace(
         placement,
-        frame=frame,
         # The last digits of a fit change from run to run, and units are named by what they rest on.
-        correction=tuple(np.round(levelling.correction, 9).reshape(-1).tolist()),
+        correction=tuple((np.round(levelling.correction, 9) + 0.0).reshape(-1).tolist()),
         correction_sd_deg=tuple(np.round(levelling.sd_deg, 3).tolist()),
     )

@@ -9,7 +9,7 @@ from then on they are exact at any pose, and the detector is no longer needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,10 +36,15 @@ farther than this, and otherwise to the nearest point."""
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """One detection. rotation: R_C [3, 3]. pixels: float [P, 2]."""
+    """One detection. rotation: R_C [3, 3]. landmarks: float [P, 3], as a detector gives them."""
 
     rotation: np.ndarray
-    pixels: np.ndarray
+    landmarks: np.ndarray
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """float [P, 2]."""
+        return self.landmarks[:, :2]
 
 
 def _rounded(weights: np.ndarray, decimals: int) -> np.ndarray:
@@ -59,21 +64,14 @@ def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera, to
     """
     hits, missed = zip(*(_cast(surface, view, camera) for view in views), strict=True)
     found, beside = np.stack(hits), np.stack(missed)
-    centre, astray = _brought_back(_robust_mean(found), topology)
-    triangles, weights = _onto(surface, centre)
-    absent = np.isnan(centre).any(axis=1)
-    triangles[absent], weights[absent] = -1, np.nan
-    # The last digits of a fit change from run to run, and units are named by what they rest on.
-    # A millionth of a triangle is a few nanometres.
-    weights = _rounded(weights, 6)
-    points = surface.points(triangles, weights)
+    centre, astray = _brought_back(robust_mean(found), topology)
+    mean = anchors_at(surface, centre, topology)
+    points, absent = mean.points, mean.triangles < 0
     distances = np.linalg.norm(np.where(beside[..., None], np.nan, found) - points, axis=2)
     seen = [camera.project(points @ view.rotation.T + camera.translation_mm) for view in views]
     pixels = [np.linalg.norm(p - view.pixels, axis=1) for p, view in zip(seen, views, strict=True)]
-    return Anchors(
-        triangles=triangles,
-        weights=weights,
-        points=points,
+    return replace(
+        mean,
         views=len(views),
         off=int((astray | (beside.mean(axis=0) > 0.5))[~absent].sum()),
         residual_px=_rms(np.stack(pixels)),
@@ -81,9 +79,15 @@ def find_anchors(surface: Surface, views: Sequence[Sighting], camera: Camera, to
     )
 
 
-def cast_views(surface: Surface, views: Sequence[Sighting], camera: Camera) -> np.ndarray:
-    """Each view's own landmarks on the surface, float64 [views, P, 3], frame C at pose zero."""
-    return np.stack([_cast(surface, view, camera)[0] for view in views])
+def anchors_at(surface: Surface, points: np.ndarray, topology: Topology) -> Anchors:
+    """The points of a surface that stand for points near it, float [P, 3], frame C; NaN is absent."""
+    triangles, weights = _onto(surface, points)
+    absent = np.isnan(points).any(axis=1)
+    triangles[absent], weights[absent] = -1, np.nan
+    # The last digits of a fit change from run to run, and units are named by what they rest on.
+    # A millionth of a triangle is a few nanometres.
+    weights = _rounded(weights, 6)
+    return Anchors(triangles, weights, surface.points(triangles, weights))
 
 
 def _cast(surface: Surface, view: Sighting, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -103,7 +107,7 @@ def _cast(surface: Surface, view: Sighting, camera: Camera) -> tuple[np.ndarray,
     return points, missed
 
 
-def _robust_mean(points: np.ndarray) -> np.ndarray:
+def robust_mean(points: np.ndarray) -> np.ndarray:
     """Mean of the points no farther from their median than twice the median distance.
 
     [views, P, 3] -> [P, 3]; NaN where less than half of the views have a point.

@@ -109,6 +109,22 @@ def _find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
     )
 
 
+def place_face(head: Head, mesh: HeadMesh, face: Face) -> Placement:
+    """The placement of a face that is known in the mesh's own axes and units, its turn in them, too.
+
+    Raises HeadError as :func:`find_face` does.
+    """
+    axes = _nearest_axes(head, face.turn)
+    rotation = axes_rotation(*axes)
+    in_axes = graphics_rotation(rotation) @ face.turn
+    try:
+        if (np.abs(angles_from_rotation(in_axes)) > STRAIGHT_DEG).any():
+            return _turned(head, mesh, face.seen_from(face.turn), face.turn)
+        return _measure(head, mesh, face.rotated(rotation), axes, rotation, ())
+    except HeadError as error:
+        raise HeadError(f"{head.mesh_path}: {error}") from error
+
+
 def _straight(head: Head, mesh: HeadMesh, part: HeadMesh, axes: Axes, eyes: Eyes) -> Placement | None:
     """The placement of a face in part of the mesh that looks along some axes, or None."""
     rotation = axes_rotation(*axes)

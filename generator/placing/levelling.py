@@ -1,45 +1,61 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a head's canonical pose zero is, and how sure that is."""
+"""Where the pose zero "level" of a head is, and how sure that is."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from generator.geometry.rotation import angles_from_rotation, graphics_rotation
-from generator.landmarks.facing import facing
+from generator.geometry.rotation import graphics_rotation
+from generator.landmarks.facing import detected_facing
 from generator.landmarks.topology import Topology
+from generator.placing.anchors import Sighting
 
-SHAPE_SD_DEG = (0.3, 3.2, 0.1)
-"""Standard deviation of yaw, pitch and roll of this fit over the 24 heads of
-scripts/make_reference_face.py, whose axes agree by construction: a face is not shaped like the
-mean face, and above all its profile leaves open where its pitch is zero."""
+SHAPE_SD_DEG = (0.4, 3.3, 0.2)
+"""Standard deviation of yaw, pitch and roll of one head's zero over heads whose axes agree by construction,
+as scripts/make_anchors.py prints it for 24: a detector reads a face that is not shaped like its own some
+degrees high or low."""
 
 
 @dataclass(frozen=True, eq=False)
 class Levelling:
-    """The rotation from a mesh's own axes to the canonical pose zero.
+    """The rotation from a mesh's own axes to pose zero.
 
     correction: R_U, float64 [3, 3]. sd_deg: float64 [3], standard deviation about the axes of
-    yaw, pitch and roll: of the mean over views, and of the shape of faces.
+    yaw, pitch and roll: of the mean, and of the shape of faces.
     """
 
     correction: np.ndarray
     sd_deg: np.ndarray
 
 
-def level(points: np.ndarray, views: np.ndarray, topology: Topology) -> Levelling | None:
-    """Rigid alignment of a neutral head's anchors to the reference face; None with too few of them.
+def level(sightings: Sequence[Sighting], topology: Topology) -> Levelling | None:
+    """The zero at which the detector reads a head as level, on average over what it found near the front.
 
-    Parameters
-    ----------
-    points: float [P, 3], anchors, frame C, NaN where absent.
-    views: float [V, P, 3], the same from each view alone.
+    sightings: of one neutral head. None without any.
     """
-    rotation = facing(points, topology)
-    if rotation is None:
+    if not sightings:
         return None
-    single = [angles_from_rotation(r) for view in views if (r := facing(view, topology)) is not None]
-    noise = np.var(single, axis=0, ddof=1) / len(single) if len(single) > 1 else np.zeros(3)
-    return Levelling(graphics_rotation(rotation.T), np.sqrt(noise + np.square(SHAPE_SD_DEG)))
+    read = np.stack([s.rotation.T @ detected_facing(s.landmarks, topology) for s in sightings])
+    mean, noise = mean_rotation(read)
+    return Levelling(graphics_rotation(mean.T), np.sqrt(noise**2 + np.square(SHAPE_SD_DEG)))
+
+
+def level_together(corrections: np.ndarray) -> Levelling:
+    """The one zero of heads whose axes agree. corrections: R_U of each, [N, 3, 3]."""
+    return Levelling(*mean_rotation(corrections))
+
+
+def mean_rotation(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of rotations [N, 3, 3], and the standard error of its yaw, pitch and roll, degrees [3].
+
+    The error of a single one is not known: 0.
+    """
+    mean = Rotation.from_matrix(rotations).mean()
+    off = np.degrees((mean.inv() * Rotation.from_matrix(rotations)).as_rotvec())
+    spread = off.std(axis=0, ddof=1) if len(off) > 1 else np.zeros(3)
+    # Yaw is about y, pitch about x, roll about z.
+    return mean.as_matrix(), spread[[1, 0, 2]] / np.sqrt(len(off))

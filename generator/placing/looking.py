@@ -60,7 +60,11 @@ class Face:
 
     def seen_from(self, turn: np.ndarray) -> Face:
         """The same after a small turn of the axes, R_C [3, 3]."""
-        own = graphics_rotation(turn)
+        return self.rotated(graphics_rotation(turn.T))
+
+    def rotated(self, rotation: np.ndarray) -> Face:
+        """The same in other axes. rotation: R_U [3, 3]."""
+        own = rotation.T
         return Face(self.right_eye @ own, self.left_eye @ own, self.chin @ own, residual=self.residual)
 
     @property

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from generator.plan.settings import ROWS, Values, all_settings, beyond_defaults, plain
+from generator.plan.settings import ROWS, all_settings, plain
 
 FIRST_SETTINGS = {
     "render": (
@@ -17,13 +17,6 @@ FIRST_SETTINGS = {
     "dataset": ("images", "image_format", "passes", "validation", "unit_size"),
 }
 """Of the sections that do not choose rows."""
-
-
-def later_settings(values: Values) -> dict[str, Any]:
-    """Values by "section.key" of settings that the first release did not have, where they are used."""
-    return beyond_defaults(
-        values, lambda s: s.section not in ROWS and s.key not in FIRST_SETTINGS.get(s.section, ())
-    )
 
 
 def common_values(configuration: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

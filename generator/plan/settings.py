@@ -137,7 +137,8 @@ class Poses:
         "source", "Where pose zero is",
         choices=(
             Choice("source", "The mesh's own axes", label="As modelled"),
-            Choice("canonical", "Every head is levelled to the same face first", label="Levelled"),
+            Choice("level", "Where the detector reads heads of the source as level", label="Level"),
+            Choice("canonical", "Levelled head by head, as in earlier releases", label="Levelled before"),
         ),
         label="Pose zero",
     )  # fmt: skip

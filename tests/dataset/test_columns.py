@@ -169,13 +169,16 @@ def test_a_new_column_is_replayed(looking: Path) -> None:
 def test_a_dataset_without_it_is_older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     small_dataset.build_dataset(tmp_path / "d")
     assert verify_dataset(tmp_path / "d").ok
-    monkeypatch.setitem(ROWS, "gaze", replace(GAZE, since="1.2.0"))
-    monkeypatch.setattr("generator.dataset.format.defaults.SCHEMA_VERSION", "1.2.0")
+    monkeypatch.setitem(ROWS, "gaze", replace(GAZE, since="1.9.0"))
+    monkeypatch.setattr("generator.dataset.format.defaults.SCHEMA_VERSION", "1.9.0")
     assert "gaze" not in pq.read_schema(tmp_path / "d" / PART).names
     assert np.isnan(as_array(read_part(tmp_path / "d" / PART), "gaze")).all()
     report = verify_dataset(tmp_path / "d", workers=1)
     assert report.ok, report.text()
-    assert read_manifest(tmp_path / "d").schema_version == "1.1.0" and len(read_heads(tmp_path / "d")) == 2
+    assert (
+        read_manifest(tmp_path / "d").schema_version == SCHEMA_VERSION
+        and len(read_heads(tmp_path / "d")) == 2
+    )
 
 
 def test_a_unit_without_its_values_is_refused(rows, monkeypatch: pytest.MonkeyPatch) -> None:

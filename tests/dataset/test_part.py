@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.digest import add_digests, content_digest
 from generator.dataset.format.open import as_array
 from generator.dataset.format.part import check_part, commit_unit, read_part, write_part
@@ -48,7 +49,7 @@ def test_table_holds_what_the_unit_gave(rows):
 
 def test_schema_metadata_says_how_to_read_it():
     metadata = {key.decode(): value.decode() for key, value in SCHEMA.metadata.items()}
-    assert metadata["headturn.schema_version"] == "1.1.0"
+    assert metadata["headturn.schema_version"] == SCHEMA_VERSION
     assert metadata["headturn.landmark_topology"] == "mediapipe-face-mesh-468"
     assert metadata["headturn.configuration_digest"] == "c" * 64
     assert json.loads(metadata["headturn.versions"]) == {"headturn": "0"}

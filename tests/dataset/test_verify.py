@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from generator.dataset.format.anchors_table import read_anchors, write_anchors
+from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.heads_table import read_heads, write_heads
 from generator.dataset.format.manifest import read_manifest, write_manifest
 from generator.dataset.format.part import check_part, read_part
@@ -259,7 +260,7 @@ def test_another_schema(dataset):
     table = read_part(dataset / PART)
     pq.write_table(table.drop_columns(["quaternion"]), dataset / PART)
     problems = failures(verify_dataset(dataset))
-    assert problems["schema"] == f"{PART}: columns differ from schema 1.1.0: quaternion"
+    assert problems["schema"] == f"{PART}: columns differ from schema {SCHEMA_VERSION}: quaternion"
     metadata = {**table.schema.metadata, b"headturn.configuration_digest": b"0"}
     pq.write_table(table.replace_schema_metadata(metadata), dataset / PART)
     assert "headturn.configuration_digest is '0', expected" in failures(verify_dataset(dataset))["schema"]

@@ -13,7 +13,7 @@ from downstream_hpe.prediction.predictor import MODELS, Predictor
 from generator.geometry.rotation import rotation_from_angles
 from generator.heads.package import save_package
 from generator.heads.read import read_mesh
-from generator.placing.anchoring import anchor_head, level_head
+from generator.placing.placer import Placer
 from generator.plan.settings import Lens, Look
 from generator.plan.view_plan import framed_camera
 from generator.plan.views import Views
@@ -35,8 +35,8 @@ def seen(placed_head, renderer, detector, tmp_path_factory):
     """Landmarks of a parametric head of another seed than the training's, and its canonical R_C."""
     folder = tmp_path_factory.mktemp("seen")
     mesh = read_mesh(placed_head.head, folder)
-    _, levelling = anchor_head(mesh, placed_head.placement, renderer, detector, folder)
-    level = level_head(placed_head.head, placed_head.placement, levelling, "canonical")
+    placer = Placer(renderer, detector, folder, lambda head: mesh)
+    level = placer.subject([placed_head.head], "canonical").placement
     package = folder / "head.npz"
     save_package(level.normalise(mesh), package)
     camera = framed_camera(Lens(resolution=256, lens_mm=60.0), level.radius_mm)

@@ -36,6 +36,8 @@ from generator.messages import (
     Placed,
     PlaceOrder,
     Receipt,
+    Shared,
+    ShareOrder,
     Versions,
     VersionsOrder,
 )
@@ -87,6 +89,8 @@ class NoRenderer:
             self.placed.append(order)
             placement = Placement("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 120.0, 90.0, frame=order.frame)
             return Placed(placement, tuple(self._facts(head) for head in order.heads))
+        if isinstance(order, ShareOrder):
+            return Shared(())
         self.built.append(order)
         return self._build(order, on_image)
 

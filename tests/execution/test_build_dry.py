@@ -54,7 +54,7 @@ def test_a_build_from_nothing(tmp_path: Path) -> None:
     result = dry.build()
     assert [path.name for path in result.pictures if path.stat().st_size > 5000] == ["detection_rate.png"]
     assert result.complete
-    assert dry.said.stages == {"placing heads": 2, "rendering": 12}
+    assert dry.said.stages == {"looking at the first heads": 2, "placing heads": 2, "rendering": 12}
     assert [len(order.views) for order in dry.lanes.built] == [4, 2, 4, 2], "head by head, chunk by chunk"
     assert [kind for kind, _ in dry.said.events] == ["unit"] * 4
     assert sorted(dry.rendered) == [row["sample_id"] for row in dry.rows]

@@ -28,9 +28,9 @@ from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, graphics_rotation,
 from generator.heads.placement import Placement
 from generator.heads.units import BY_EYES
 from generator.landmarks.anchors import Anchors
+from generator.landmarks.facing import facing
 from generator.landmarks.topology import FACE_MESH
 from generator.messages import HeadFacts, LaneOrder, Placed, PlaceOrder, Receipt
-from generator.placing.levelling import level
 from generator.sealed import SEAL, sealed_line, unsealed
 
 FILES = {"images": "files", "unit_size": 4}
@@ -46,26 +46,27 @@ class Levelled(NoRenderer):
         self.placed.append(order)
         turned = rotation_from_angles(np.array([12.0, 3.0, -2.0]))
         points = FACE_MESH.surface_face() @ CAMERA_FROM_GRAPHICS @ turned.T
-        found = level(points, np.stack([points, points]), FACE_MESH)
+        found = facing(points, FACE_MESH)
         assert found is not None
         placement = Placement("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 120.0, 90.0, frame=order.frame)
         placement = replace(
             placement,
-            correction=tuple(np.round(found.correction, 9).reshape(-1).tolist()),
-            correction_sd_deg=tuple(np.round(found.sd_deg, 3).tolist()),
+            correction=tuple(np.round(graphics_rotation(found.T), 9).reshape(-1).tolist()),
+            correction_sd_deg=(0.3, 3.2, 0.1),
         )
         weights = np.full((len(points), 3), [0.25, 0.25, 0.5])
         anchors = Anchors(np.zeros(len(points), np.int32), weights, points, views=14)
         return Placed(placement, tuple(HeadFacts(3, 1, (), anchors) for _ in order.heads))
 
 
-def edited(file: Path, change: Callable[[dict[str, Any]], None], *, seal: bool) -> None:
-    """The first record of a file of sealed lines changed; seal: by somebody who knows about checksums."""
-    first, *rest = file.read_text().splitlines()
-    record = unsealed(json.loads(first))
+def edited(file: Path, change: Callable[[dict[str, Any]], None], *, seal: bool, line: int = 0) -> None:
+    """A record of a file of sealed lines changed; seal: by somebody who knows about checksums."""
+    lines = file.read_text().splitlines()
+    record = unsealed(json.loads(lines[line]))
     change(record)
-    stale = {**record, SEAL: json.loads(first)[SEAL]}
-    file.write_text("\n".join([sealed_line(record) if seal else json.dumps(stale), *rest]) + "\n")
+    stale = {**record, SEAL: json.loads(lines[line])[SEAL]}
+    lines[line] = sealed_line(record) if seal else json.dumps(stale)
+    file.write_text("\n".join(lines) + "\n")
 
 
 def turn_the_correction(record: dict[str, Any]) -> None:
@@ -121,7 +122,7 @@ def test_what_was_noted_about_a_head_is_held_against_its_anchors(
     digest = dry.digest
     shutil.rmtree(dry.root / "data")
     (dry.root / MANIFEST_FILE).unlink()
-    edited(dry.root / PLACED_FILE, change, seal=seal)
+    edited(dry.root / PLACED_FILE, change, seal=seal, line=-1)  # the first ones were of the first look
     lanes = Levelled()
     dry.build(poses=CANONICAL, lanes=lanes)
     assert len(lanes.placed) == 1, "that subject is looked at again, the other is not"

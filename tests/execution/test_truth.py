@@ -41,6 +41,8 @@ from generator.geometry.rotation import (
 from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
 from generator.heads.source import find_heads
+from generator.landmarks.anchors import no_anchors
+from generator.landmarks.topology import FACE_MESH
 from generator.placing.anchoring import level_head
 from generator.plan.config import load_config
 
@@ -154,12 +156,12 @@ def test_wrong_passes_and_visibility_are_found(truth: Path, tmp_path: Path, what
 
 
 def test_each_frame_is_derived_from_the_other(truth: Path, one_head: Path, tmp_path: Path) -> None:
-    """R_source = R_canonical · D C D, C being the column `correction`; pictures prove it."""
-    canonical = run(tmp_path / "canonical", one_head, poses={**POSES, "frame": "canonical"})
+    """R_source = R_level · D C D, C being the column `correction`; pictures prove it."""
+    canonical = run(tmp_path / "level", one_head, poses={**POSES, "frame": "level"})
     assert verify_dataset(canonical).ok
     [head] = read_heads(canonical)
     [in_source] = read_heads(truth)
-    assert head.frame == "canonical"
+    assert head.frame == "level"
     assert head.correction == in_source.correction, "estimated and recorded in either frame"
     assert all(0 < sd < 6 for sd in head.correction_sd_deg)
     correction = graphics_rotation(np.array(head.correction).reshape(3, 3))
@@ -184,12 +186,14 @@ def test_each_frame_is_derived_from_the_other(truth: Path, one_head: Path, tmp_p
         assert np.abs(a.astype(int) - b.astype(int)).mean() < 0.05
 
 
-def test_a_head_that_cannot_be_levelled_is_refused_in_one_line(one_head: Path) -> None:
+@pytest.mark.parametrize("frame", ["level", "canonical"])
+def test_a_head_that_cannot_be_levelled_is_refused_in_one_line(one_head: Path, frame: str) -> None:
     head = find_heads(one_head).heads[0]
+    nothing = no_anchors(FACE_MESH)
     placement = Placement("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 150.0, 90.0)
-    assert level_head(head, placement, None, "source").frame == "source"
+    assert level_head(head, placement, nothing, None, FACE_MESH) == placement
     with pytest.raises(HeadError, match=r"neutral\.obj: cannot be levelled: too few landmarks") as error:
-        level_head(head, placement, None, "canonical")
+        level_head(head, replace(placement, frame=frame), nothing, None, FACE_MESH)
     assert "\n" not in str(error.value)
 
 

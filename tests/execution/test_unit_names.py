@@ -48,7 +48,7 @@ def test_the_release_changes_no_name(dry: DryBuild, monkeypatch: pytest.MonkeyPa
 def test_the_content_version_changes_every_name(dry: DryBuild, monkeypatch: pytest.MonkeyPatch) -> None:
     dry.build()
     parts = dry.parts
-    monkeypatch.setattr("generator.content.CONTENT_VERSION", 2)
+    monkeypatch.setattr("generator.content.CONTENT_VERSION", 99)
     with pytest.raises(DatasetError, match=r"4 parts .* will be deleted"):
         dry.build()
     dry.build(confirm=lambda what: True)

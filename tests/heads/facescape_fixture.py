@@ -10,7 +10,7 @@ four holes.
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -46,14 +46,23 @@ def fixture_head() -> FixtureHead:
 
 
 def write_subject(
-    folder: Path, expressions: tuple[int, ...] = (1,), *, textures: bool = True, texture_px: int = 256
+    folder: Path,
+    expressions: tuple[int, ...] = (1,),
+    *,
+    textures: bool = True,
+    texture_px: int = 256,
+    stretch: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """``<k>_<name>.obj``, ``.obj.mtl`` and ``.jpg`` straight into ``folder``."""
+    """``<k>_<name>.obj``, ``.obj.mtl`` and ``.jpg`` straight into ``folder``.
+
+    stretch: of the head along its axes, so that subjects differ.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     head = fixture_head()
     for k in expressions:
         stem = f"{k}_{NAMES[k - 1]}"
-        (folder / f"{stem}.obj").write_text(_obj_text(head, f"{stem}.obj.mtl"))
+        shaped = replace(head, vertices=head.vertices * stretch)
+        (folder / f"{stem}.obj").write_text(_obj_text(shaped, f"{stem}.obj.mtl"))
         (folder / f"{stem}.obj.mtl").write_text(MTL.format(texture=f"{stem}.jpg"))
         if textures:
             head.texture.resize((texture_px, texture_px)).save(folder / f"{stem}.jpg", quality=92)

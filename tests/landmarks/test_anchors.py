@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -205,20 +206,27 @@ def test_holes_lie_where_the_renderer_draws_them(tmp_path: Path, wrap: str, hole
     assert "".join("x" if triangle < 0 else "." for triangle in found.triangles) == holes
 
 
-def test_levelling_undoes_a_turned_face() -> None:
-    turned = rotation_from_angles(np.array([12.0, -8.0, 5.0]))
-    points = 1.3 * FACE_MESH.surface_face() @ CAMERA_FROM_GRAPHICS @ turned.T + [1.0, 2.0, 3.0]
-    levelling = level(points, np.stack([points, points]), FACE_MESH)
+def sighting(pose_deg: Sequence[float], leaning: np.ndarray) -> Sighting:
+    """What a detector that finds the mean face says of a head at a pose, whose face leans in its own axes."""
+    rotation = rotation_from_angles(np.array(pose_deg, dtype=float))
+    level = rotation_from_angles(np.array([0.0, -FACE_MESH.level_pitch_deg, 0.0]))  # as its own model face is
+    face = FACE_MESH.reference_face() @ CAMERA_FROM_GRAPHICS @ level.T
+    return Sighting(rotation, 1.3 * face @ (rotation @ leaning).T + [200.0, 190.0, -3.0])
+
+
+def test_levelling_undoes_a_leaning_face() -> None:
+    leaning = rotation_from_angles(np.array([2.0, -8.0, 1.0]))
+    # A turn about the pose's own axes is a turn of the head: which pose it was seen at does not matter.
+    same = [sighting(pose, leaning) for pose in ((0, 0, 0), (10, 0, 0), (0, 8, 0), (-6, 5, -5))]
+    levelling = level(same, FACE_MESH)
     assert levelling is not None
-    assert geodesic_deg(graphics_rotation(levelling.correction), turned.T) < 1e-6
-    np.testing.assert_allclose(levelling.sd_deg, SHAPE_SD_DEG)
-    lifted = points @ rotation_from_angles(np.array([0.0, 4.0, 0.0])).T
-    shaky = level(points, np.stack([points, lifted] * 2), FACE_MESH)
+    assert geodesic_deg(graphics_rotation(levelling.correction), leaning.T) < 1e-4
+    np.testing.assert_allclose(levelling.sd_deg, SHAPE_SD_DEG, atol=1e-4)
+    lifted = [sighting((0, 0, 0), leaning @ rotation_from_angles(np.array([0.0, up, 0.0]))) for up in (0, 4)]
+    shaky = level(lifted, FACE_MESH)
     assert shaky is not None
     assert shaky.sd_deg[1] > levelling.sd_deg[1] + 0.1
-    points[200:] = np.nan
-    points[199] = np.nan
-    assert level(points, points[None], FACE_MESH) is None, "too few points"
+    assert level([], FACE_MESH) is None
 
 
 def test_the_surface_face_is_symmetric() -> None:

@@ -21,7 +21,7 @@ from generator.landmarks.topology import Topology
 if TYPE_CHECKING:
     from generator.dataset.format.unit_rows import UnitRows
 
-SCHEMA_VERSION = "1.1.0"
+SCHEMA_VERSION = "1.2.0"
 """A new column raises the middle number, and says so in its ``since``; readers of the old one go on."""
 
 ImageMode = Literal["none", "files", "embedded"]

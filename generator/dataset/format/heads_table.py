@@ -20,6 +20,7 @@ from generator.dataset.format.schema import check_schema_version, is_newer, stor
 from generator.errors import DatasetError
 from generator.escape import quoted
 from generator.geometry.camera import Camera, Projection
+from generator.landmarks.anchors import WAYS
 from generator.landmarks.topology import FACE_MESH
 from generator.names import source_path_problem
 
@@ -79,15 +80,19 @@ class HeadRow:
     frame: str = field(
         default="source",
         metadata=column(
-            _TEXT, "where pose zero is: source (the mesh's own axes) or canonical (levelled)", since="1.1.0"
+            _TEXT,
+            "where pose zero is: source (the mesh's own axes), level (a detector reads it as level) or "
+            "canonical (levelled as in earlier releases)",
+            since="1.1.0",
         ),
     )
     correction: tuple[float, ...] = field(
         default=IDENTITY,
         metadata=column(
             list_of(_NUMBER, 9),
-            "R_U, row-major, that turns the mesh from its own axes (after up and forward) to the "
-            "canonical pose zero; applied only where frame is canonical",
+            "R_U, row-major, that turns the mesh from its own axes (after up and forward) to pose zero "
+            "level, or canonical where frame is that or the dataset of content version 1; applied unless "
+            "frame is source",
         ),
     )
     correction_sd_deg: tuple[float, ...] = field(
@@ -147,6 +152,15 @@ class HeadRow:
             "rms distance of each anchor from the mirror image of its partner",
             check="anchors",
             since="1.1.0",
+        ),
+    )
+    anchor_way: str = field(
+        default="head",
+        metadata=column(
+            _TEXT,
+            "; ".join(f"{way}: {meaning}" for way, meaning in WAYS.items()),
+            check="anchors",
+            since="1.2.0",
         ),
     )
     vertices: int = field(metadata=column(_COUNT, "of the mesh"))

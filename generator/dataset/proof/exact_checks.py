@@ -17,7 +17,7 @@ from generator.dataset.proof.named import named
 from generator.geometry.rigid import fit_rotations
 from generator.geometry.rotation import geodesic_deg, graphics_rotation
 from generator.landmarks.anchors import WEIGHTS_SUM
-from generator.landmarks.facing import levelling_problem
+from generator.landmarks.shared import packaged, shared_levelling_problem
 from generator.landmarks.topology import Topology
 
 CLOSURE_DEG = 1e-6
@@ -49,10 +49,17 @@ def anchor_problems(heads: Sequence[HeadRow], anchors: dict[tuple[str, str], Hea
 def levelling_problems(
     heads: Sequence[HeadRow], anchors: dict[tuple[str, str], HeadAnchors], topology: Topology
 ) -> Iterator[str]:
-    """Each subject's correction against the anchors of its heads: the same mean face was fitted to both.
+    """Each subject's correction against the anchors of its heads, and anchors of the package against those.
 
     Only of use where the dataset is of today's content version: another may have had another mean face.
     """
+    ours = [shared.anchors.weights for shared in packaged(topology)]
+    for head in heads:
+        found = anchors.get((head.subject, head.expression))
+        if head.anchor_way == "package" and found is not None:
+            there = np.isfinite(found.weights)
+            if not any(np.array_equal(found.weights[there], weights[there]) for weights in ours):
+                yield f"anchors.parquet: {head.subject}/{head.expression}: not the anchors of the package"
     subjects: dict[str, list[HeadRow]] = {}
     for head in heads:
         subjects.setdefault(head.subject, []).append(head)
@@ -61,13 +68,15 @@ def levelling_problems(
         if any((h.frame, h.correction) != (first.frame, first.correction) for h in rows):
             yield f"heads.parquet: {subject} has more than one correction"
             continue
-        levelled = np.reshape(first.correction if first.frame == "canonical" else IDENTITY, (3, 3))
+        levelled = np.reshape(IDENTITY if first.frame == "source" else first.correction, (3, 3))
         turned = graphics_rotation(levelled)
         points = [
             anchors[h.subject, h.expression].points for h in rows if (h.subject, h.expression) in anchors
         ]
         own = [p @ turned for p in points if p.shape == (topology.count, 3)]  # row vectors: R^T x
-        problem = levelling_problem(first.frame, first.correction, first.correction_sd_deg, own, topology)
+        problem = shared_levelling_problem(
+            first.frame, first.correction, first.correction_sd_deg, own, topology, first.anchor_way
+        )
         if problem:
             yield f"heads.parquet: {subject}: {problem}"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows that are already there under another name: of a smaller grid, or of the first release."""
+"""Rows that are already there under another name: of a smaller grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pyarrow as pa
 from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.part import part_schema_of, read_part, write_part
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import schema_version_of, versions_of
+from generator.dataset.format.schema import schema_version_of
 from generator.errors import DatasetError
 from generator.execution.build.receipts import Receipts
 from generator.messages import BuildOrder
@@ -45,11 +45,8 @@ def earlier_parts(orders: Sequence[BuildOrder]) -> set[str]:
     return {path for order in orders for path in order.earlier_paths}
 
 
-def versions_of_parts(root: Path) -> dict[str, str] | None:
-    """The versions in the first part that can be read; None if there is none.
-
-    Raises DatasetError if it is of another schema: parts of two schemas make no dataset.
-    """
+def check_schema_of_parts(root: Path) -> None:
+    """Raises DatasetError if the parts that are there are of another schema: two make no dataset."""
     for path in sorted((root / "data").rglob("part-*.parquet")):
         try:
             schema = part_schema_of(path)
@@ -61,8 +58,7 @@ def versions_of_parts(root: Path) -> dict[str, str] | None:
                 f"{root}: its rows are of schema {found}, a build adds rows of {SCHEMA_VERSION}; "
                 f"run `headturn upgrade {root}` first, or choose another --out"
             )
-        return versions_of(schema)
-    return None
+        return
 
 
 def _renamed(order: BuildOrder, part: PartInfo, root: Path) -> PartInfo:

@@ -36,6 +36,7 @@ def head_row(planned: PlannedHead, mesh_path: str, topology: Topology) -> HeadRo
         frame=placement.frame,
         correction=placement.correction,
         correction_sd_deg=placement.correction_sd_deg,
+        anchor_way=anchors.way,
         anchor_views=anchors.views,
         anchor_off=anchors.off,
         anchor_absent=anchors.absent,

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 from generator.dataset.format.files import file_sha256
 from generator.errors import HeadError
 from generator.execution.build.head_rows import relative
 from generator.execution.build.placed_heads import PlacedHeads
+from generator.execution.build.shared_heads import find_shared
 from generator.execution.build.units import PlannedHead, assign_split, head_camera
 from generator.execution.executors.executor import Executor
 from generator.execution.status import Reporter
@@ -33,12 +35,15 @@ def place_heads(
     skipped = list(source.skipped)
     for missing in skipped:
         reporter.note(f"skipped {missing.subject}/{missing.expression}: {missing.reason}")
+    hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
+    kept = PlacedHeads(root, versions, hashes)
     orders = place_orders(source, config)
+    shared = find_shared(orders, kept, executor, reporter)
+    orders = [replace(order, shared=shared) for order in orders]
     reporter.stage("placing heads", len(orders))
     planned: list[PlannedHead] = []
     known: dict[str, list[str]] = {}
-    hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
-    for outcome in PlacedHeads(root, versions, hashes).outcomes(orders, executor):
+    for outcome in kept.outcomes(orders, executor):
         reporter.advance()
         heads = expect(PlaceOrder, outcome.order).heads
         placed = None if outcome.receipt is None else expect(Placed, outcome.receipt)

@@ -27,7 +27,7 @@ from generator.dataset.show.card import write_card
 from generator.dataset.show.pictures import anchor_sheet, contact_sheet, detection_map
 from generator.errors import DatasetError
 from generator.execution.build.chunks import chunk_poses
-from generator.execution.build.extend import carry_over, earlier_parts, versions_of_parts
+from generator.execution.build.extend import carry_over, check_schema_of_parts, earlier_parts
 from generator.execution.build.folder import (
     ANCHOR_SHEET_FILE,
     FAILURES_FILE,
@@ -140,7 +140,7 @@ def _build(
 ) -> BuildResult:
     source = find_source(config, root, reporter, executor.workers)
     versions = lane_versions(executor, config.landmarks)
-    recorded_versions = versions_of_parts(root)
+    check_schema_of_parts(root)
     planned, skipped = place_heads(source, config, versions, root, executor, reporter)
     lock.check()
     heads = [(head.head.subject, head.head.expression) for head in planned]
@@ -153,7 +153,6 @@ def _build(
         root=root,
         configuration_digest=configuration_digest(common_values(config.as_dict())),
         versions=versions,
-        recorded_versions=recorded_versions,
     )
     receipts = Receipts(root)
     stale = stale_parts(root, orders)

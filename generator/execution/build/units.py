@@ -14,7 +14,6 @@ import numpy as np
 
 from generator.codec import to_plain
 from generator.content import deciding
-from generator.execution.build import first_release
 from generator.execution.build.chunks import Chunk, ChunkedPoses, Indices
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import graphics_rotation
@@ -70,14 +69,12 @@ def plan_units(
     root: Path,
     configuration_digest: str,
     versions: Mapping[str, str],
-    recorded_versions: Mapping[str, str] | None = None,
 ) -> list[BuildOrder]:
     """The build orders of every unit, head by head.
 
     A unit's name is the hash of everything that decides its content: the content version and the
     libraries, head files, placement, views, settings that are not the default. So a part that is
-    already there under that name needs no rebuilding. recorded_versions: of the parts that are
-    there, if any: those of the first release have other names, which the orders know.
+    already there under that name needs no rebuilding.
     """
     settings = beyond_defaults(config.as_dict(), lambda s: s.info.content and s.section not in ROWS)
     orders = []
@@ -97,7 +94,6 @@ def plan_units(
                 **({"without": head.without} if head.without else {}),
             }
         )
-        earlier = first_release.names(planned, config, recorded_versions, versions)
         for chunk in poses.of(head.subject, head.expression):
             views = plan_views(config, head.name, planned.placement.radius_mm, chunk.poses)
             seen = [to_plain(views.cameras), to_plain(views.looks)]
@@ -106,8 +102,6 @@ def plan_units(
                 return _digest([fixed, seen, chunk.poses, indices])[:16]
 
             before = [name(chunk.earlier_indices)] if chunk.earlier_indices else []
-            if earlier is not None:
-                before += [earlier(chunk.poses, i) for i in (chunk.indices, chunk.earlier_indices) if i]
             order = build_order(
                 head, planned.placement, points, planned.split, views, chunk.indices, config, root
             )

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -35,8 +35,19 @@ from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
 from generator.heads.surroundings import head_alone
 from generator.landmarks.detector import Detector, open_detector
+from generator.landmarks.shared import SharedAnchors, packaged
 from generator.landmarks.surface import Surface
-from generator.messages import BuildOrder, Built, LaneOrder, PlaceOrder, Receipt, Versions, VersionsOrder
+from generator.messages import (
+    BuildOrder,
+    Built,
+    LaneOrder,
+    PlaceOrder,
+    Receipt,
+    Shared,
+    ShareOrder,
+    Versions,
+    VersionsOrder,
+)
 from generator.placing.placer import Placer
 from generator.placing.rendering import read_image
 from generator.plan.settings import Landmarks
@@ -78,7 +89,9 @@ class Lane:
             return Versions(self._versions(order.landmarks))
         if isinstance(order, PlaceOrder):
             self._loaded = None
-            return self.placer(order.landmarks).subject(order.heads, order.frame)
+            return self.placer(order.landmarks, order.shared).subject(order.heads, order.frame)
+        if isinstance(order, ShareOrder):
+            return Shared(self.placer(order.landmarks).share(order.heads, order.placed))
 
         def watched() -> None:
             on_image()
@@ -104,9 +117,11 @@ class Lane:
             self._detectors[landmarks] = open_detector(landmarks)
         return self._detectors[landmarks]
 
-    def placer(self, landmarks: Landmarks) -> Placer:
-        """What places heads for a detector."""
-        return Placer(self._places, self.detector(landmarks), self._scratch, self.read)
+    def placer(self, landmarks: Landmarks, shared: Sequence[SharedAnchors] = ()) -> Placer:
+        """What places heads for a detector. shared: anchors that are known besides those of the package."""
+        detector = self.detector(landmarks)
+        known = (*packaged(detector.topology), *shared)
+        return Placer(self._places, detector, self._scratch, self.read, known)
 
     def read(self, head: Head, textures: Path | None = None) -> HeadMesh:
         """A head's mesh as its source has it. Raises HeadError if it cannot be read.

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the anchors that all parametric heads share: generator/landmarks/parametric_anchors.csv.
+
+    python scripts/make_anchors.py [--heads 24] [--model canonical_face.csv] [--check]
+
+Places heads one by one, each by 14 detections of its own, averages what was found on the mean head, and
+prints how far single heads are from it. A few minutes. ``--model`` is the detector's own model face, a
+table of x,y,z: where the detector reads our reference face by it is ``level_pitch_deg`` of
+generator/landmarks/topology.py. ``--check`` writes nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from generator.execution.lanes.lane import Lane
+from generator.execution.lanes.options import LaneOptions
+from generator.geometry.rigid import fit_similarity
+from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, angles_from_rotation, graphics_rotation
+from generator.heads.parametric.folder import head_triangles
+from generator.heads.parametric.make import make_heads
+from generator.heads.source import find_heads
+from generator.landmarks.shared import SharedAnchors, write_shared
+from generator.landmarks.topology import FACE_MESH
+from generator.placing.placer import Placer, own_anchors
+from generator.placing.sharing import OwnAnchors, share
+from generator.plan.settings import Landmarks
+
+TARGET = Path(__file__).resolve().parents[1] / "generator" / "landmarks" / FACE_MESH.packaged_anchors[0]
+SEED = 2024
+
+
+def found_alone(count: int) -> list[OwnAnchors]:
+    """Neutral parametric heads, each with the anchors that were found on it alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        make_heads(root / "heads", count=count, seed=SEED)
+        (root / "scratch").mkdir()
+        lane = Lane(LaneOptions(scratch=str(root / "scratch")))
+        found = []
+        try:
+            placer = Placer(lane.renderer, lane.detector(Landmarks()), root / "scratch", lane.read)
+            for head in find_heads(root / "heads").heads:
+                placed = placer.subject([head], "source")
+                [facts] = placed.facts
+                if facts.anchors is None or not facts.anchors.views:
+                    raise SystemExit(f"{head.name}: no face was found")
+                found.append(own_anchors(lane.read(head), placed.placement, facts.anchors))
+        finally:
+            lane.close()
+    return found
+
+
+def report(found: list[OwnAnchors], shared: SharedAnchors) -> None:
+    """Print how far single heads' anchors and zeros are from what they share."""
+    apart = []
+    for head in found:
+        own = head.mesh.vertices[head.mesh.triangles[head.anchors.triangles]]
+        own = (head.anchors.weights[:, :, None] * own).sum(1)
+        apart.append(np.linalg.norm(own - shared.points(head.mesh.vertices, head.mesh.triangles), axis=1))
+    zeros = angles_from_rotation(graphics_rotation(np.stack([head.correction for head in found])))
+    print(f"{len(found)} heads, {shared.anchors.views} detections")
+    print(f"single heads' anchors from the shared: median {np.nanmedian(apart):.2f} mm, ", end="")
+    print(f"95 % within {np.nanpercentile(apart, 95):.2f} mm")
+    halves = [share(found[k::2], FACE_MESH, count=shared.count, way="package").anchors.points for k in (0, 1)]
+    between = np.linalg.norm((halves[0] - halves[0].mean(0)) - (halves[1] - halves[1].mean(0)), axis=1)
+    print(f"those of half of the heads from those of the others: median {np.median(between):.2f} mm")
+    for name, values in zip(("yaw", "pitch", "roll"), zeros.T, strict=True):
+        print(f"zero, {name}: mean {values.mean():.2f} degrees, sd {values.std(ddof=1):.2f} a head")
+
+
+def level_pitch(model: Path) -> float:
+    """Pitch of the reference face as the rigid fit of a model face reads it, degrees."""
+    points = np.loadtxt(model, delimiter=",", comments="#")
+    reference = FACE_MESH.reference_face() @ CAMERA_FROM_GRAPHICS
+    fit = fit_similarity(points @ CAMERA_FROM_GRAPHICS, reference)
+    return float(angles_from_rotation(fit.rotation)[1])
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--heads", type=int, default=24)
+    parser.add_argument("--model", type=Path)
+    parser.add_argument("--check", action="store_true")
+    wanted = parser.parse_args()
+    if wanted.model is not None:
+        print(f"level_pitch_deg: {level_pitch(wanted.model):.3f}, used: {FACE_MESH.level_pitch_deg}")
+    found = found_alone(wanted.heads)
+    count = len(head_triangles(long_hair=False)[0])
+    shared = share(found, FACE_MESH, count=count, way="package")
+    report(found, shared)
+    if not wanted.check:
+        write_shared(shared, TARGET, "scripts/make_anchors.py")
+        print(f"{TARGET.name} written")
+
+
+if __name__ == "__main__":
+    main()
