@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,9 @@ EXACT = 8192
 
 CELLS = 16
 """Cells along the longest side of a mesh."""
+
+KEPT = 3
+"""Backdrops of a render worker: of the images, and of the looks by which heads are placed."""
 
 _WIDTH, _HEIGHT, _DATA = slice(18, 22), slice(22, 26), slice(10, 14)
 
@@ -71,6 +74,26 @@ class Backdrop:
                 raise RuntimeError(f"{path}: Blender rendered {_size(cropped)} pixels of {box}")
             _pixels(whole)[bottom:top, left:right] = _pixels(cropped)
         path.write_bytes(whole)
+
+
+class Backdrops:
+    """Backdrops by all that they depend on, which is no head: the newest few serve the heads to come."""
+
+    def __init__(self) -> None:
+        self._kept: dict[Hashable, Backdrop] = {}
+
+    def find(self, depends_on: Hashable) -> Backdrop | None:
+        """The one that was kept, which is the newest now."""
+        found = self._kept.pop(depends_on, None)
+        if found is not None:
+            self._kept[depends_on] = found
+        return found
+
+    def keep(self, depends_on: Hashable, backdrop: Backdrop) -> None:
+        """Keep one, and drop the oldest of too many."""
+        self._kept[depends_on] = backdrop
+        while len(self._kept) > KEPT:
+            del self._kept[next(iter(self._kept))]
 
 
 def _size(bmp: bytes | bytearray) -> tuple[int, int]:

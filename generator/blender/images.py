@@ -10,7 +10,8 @@ from typing import Any
 import bpy
 
 from generator.blender import compat
-from generator.blender.crop import Backdrop, Box, Outline
+from generator.blender.clearing import clear
+from generator.blender.crop import Backdrop, Backdrops, Box, Outline
 from generator.blender.passes import render_passes
 from generator.blender.stage import Stage
 from generator.heads.mesh import HeadMesh
@@ -21,17 +22,17 @@ class Images:
     """Renders views of one head.
 
     Replaces everything in Blender by the head. mesh: frame U, mm, pivot at the origin.
-    threads: of Cycles; 0 lets Blender take every core.
+    threads: of Cycles; 0 lets Blender take every core. backdrops: of heads before.
     """
 
-    def __init__(self, mesh: HeadMesh, *, threads: int = 0) -> None:
+    def __init__(self, mesh: HeadMesh, *, threads: int = 0, backdrops: Backdrops | None = None) -> None:
         self._mesh, self._threads = mesh, threads
         self._outline = Outline(mesh.vertices)
         self._stage: Stage | None = None
         self._knows_uv = False
         self._empty: Any = None  # what an image without the head depends on, of the last view
         self._alike = 0  # views in a row for which that is the same
-        self._backdrop: Backdrop | None = None
+        self._backdrops = backdrops or Backdrops()
 
     def render(self, view: View, path: Path) -> None:
         """Render a view into path: .bmp (sRGB) or .exr (linear float32).
@@ -44,21 +45,22 @@ class Images:
         self._knows_uv = False
         empty = (view.camera.width, view.camera.height, view.look.preset, view.look.background)
         self._alike = self._alike + 1 if empty == self._empty else 1
-        if empty != self._empty:
-            self._empty, self._backdrop = empty, None
-        # The backdrop costs as much as an image, so it is made for the second.
-        if path.suffix != ".bmp" or self._alike == 1:
+        self._empty = empty
+        backdrop = self._backdrops.find(empty) if path.suffix == ".bmp" else None
+        # A backdrop costs as much as an image, so one is made for the second.
+        if backdrop is None and (path.suffix != ".bmp" or self._alike == 1):
             _render(path)
             return
-        if self._backdrop is None:
+        if backdrop is None:
             stage.head.hide_render = True
             _render(path)
             stage.head.hide_render = False
-            self._backdrop = Backdrop(path)
+            backdrop = Backdrop(path)
+            self._backdrops.keep(empty, backdrop)
         box = self._outline.box(view.pose, view.camera)
         if box is not None:
             _render(path, box)
-        self._backdrop.lay(path, box)
+        backdrop.lay(path, box)
 
     def render_passes(self, view: View, path: Path, passes: Sequence[str]) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
@@ -72,7 +74,7 @@ class Images:
     def _show(self, view: View) -> Stage:
         if self._stage is None or not self._stage.fits(view.look):
             self._stage = None
-            bpy.ops.wm.read_factory_settings(use_empty=True)
+            clear()
             self._stage = Stage(bpy.context.scene, self._mesh, view.look, threads=self._threads)
         self._stage.show(view)
         return self._stage

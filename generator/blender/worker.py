@@ -48,9 +48,9 @@ from generator.process import end_with_parent  # noqa: E402
 if __name__ == "__main__":
     end_with_parent()  # before bpy, which takes a second to load: its host may die in it
 
-import bpy  # noqa: E402
-
 from generator.blender import compat  # noqa: E402
+from generator.blender.clearing import clear  # noqa: E402
+from generator.blender.crop import Backdrops  # noqa: E402
 from generator.blender.images import Images  # noqa: E402
 from generator.blender.importing import export_glb, import_mesh  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
@@ -76,6 +76,7 @@ class RenderWorker:
         self._threads = threads
         self._loaded: tuple[Path, int] | None = None
         self._images: Images | None = None
+        self._backdrops = Backdrops()
 
     def carry_out(self, order: Any, answer: Answer) -> None:
         """Carry out an order. TypeError if it is none of a render worker's."""
@@ -92,7 +93,8 @@ class RenderWorker:
         wanted = (package, package.stat().st_mtime_ns)
         if wanted != self._loaded:
             self._loaded = None
-            self._images = Images(load_package(package), threads=self._threads)
+            mesh = load_package(package)
+            self._images = Images(mesh, threads=self._threads, backdrops=self._backdrops)
             self._loaded = wanted
         assert self._images is not None
         for place, view in enumerate(order.views):
@@ -105,7 +107,7 @@ class RenderWorker:
 
     def _convert(self, order: ConvertOrder) -> None:
         self._loaded = None
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        clear()
         import_mesh(Path(order.source))
         export_glb(Path(order.target))
 

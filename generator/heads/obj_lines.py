@@ -11,6 +11,7 @@ import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -22,6 +23,10 @@ from generator.heads.limits import MAX_MATERIALS, check_count
 MAX_INDEX = 2**31 - 1
 _BLOCK = 1 << 22
 """Characters that are split into lines at a time."""
+
+_RUNS, _SHARED = 12, 1 << 20
+"""Heads of one topology have the same faces and texture coordinates, letter by letter: so many runs of lines,
+of fewer characters, are read once for all of them."""
 
 _POINTS = {
     key: {width: re.compile(rf"(?:{key.strip()}(?: +[-+.0-9eE]+){{{width}}} *\n)+") for width in widths}
@@ -89,6 +94,39 @@ def parse_lines(text: str) -> ObjLines:
     return _Parser().parse(text)
 
 
+def _points(key: str, run: str) -> np.ndarray | None:
+    """float64 [N, width] of lines that all begin with key and have as many numbers; None if they do not."""
+    width = next((width for width, pattern in _POINTS.get(key, {}).items() if pattern.fullmatch(run)), 0)
+    if not width:
+        return None
+    numbers = run.replace(key.strip(), " ").split()
+    try:
+        return np.fromiter(map(float, numbers), np.float64, len(numbers)).reshape(-1, width)
+    except ValueError:
+        return None
+
+
+@lru_cache(maxsize=_RUNS)
+def _uvs(run: str) -> bytes | None:
+    """Texture coordinates, float64 u, v, of lines that look alike."""
+    values = _points("vt", run)
+    return None if values is None else values[:, :2].tobytes()
+
+
+@lru_cache(maxsize=_RUNS)
+def _corners(run: str) -> tuple[int, bytes, bytes] | None:
+    """Of faces that look alike: corners each, and int32 vertex and texture coordinate of every corner."""
+    form = next((form for form in _FACES if form.pattern.fullmatch(run)), None)
+    if form is None:
+        return None
+    numbers = run.replace("f", " ").replace("/", " ").split()
+    values = np.fromiter(map(int, numbers), np.int32, len(numbers)).reshape(-1, form.width)
+    if not values[:, [0] if form.uv is None else [0, form.uv]].all():
+        return None  # whose line is to be named
+    uv = np.zeros(len(values), np.int32) if form.uv is None else values[:, form.uv]
+    return form.corners, values[:, 0].tobytes(), uv.tobytes()
+
+
 class _Parser:
     def __init__(self) -> None:
         self._obj = ObjLines()
@@ -112,19 +150,15 @@ class _Parser:
         if key == "f ":
             return self._faces(rows)
         run = "\n".join(rows) + "\n"
-        width = next((width for width, pattern in _POINTS.get(key, {}).items() if pattern.fullmatch(run)), 0)
-        if not width:
-            return False
-        numbers = run.replace(key.strip(), " ").split()
-        try:
-            values = np.fromiter(map(float, numbers), np.float64, len(numbers)).reshape(-1, width)
-        except ValueError:
-            return False
         if key == "vt":
-            self._obj.uvs.frombytes(np.ascontiguousarray(values[:, :2]).tobytes())
-        else:
+            uvs = _uvs(run) if len(run) < _SHARED else _uvs.__wrapped__(run)
+            if uvs is not None:
+                self._obj.uvs.frombytes(uvs)
+            return uvs is not None
+        values = _points(key, run)
+        if values is not None:
             self._add_vertices(values)
-        return True
+        return values is not None
 
     def _add_vertices(self, values: np.ndarray) -> None:
         """float64 [N, 3 or more]: coordinates, then a colour if all vertices have one."""
@@ -138,19 +172,15 @@ class _Parser:
 
     def _faces(self, rows: list[str]) -> bool:
         run = "\n".join(rows) + "\n"
-        form = next((form for form in _FACES if form.pattern.fullmatch(run)), None)
-        if form is None:
+        read = _corners(run) if len(run) < _SHARED else _corners.__wrapped__(run)
+        if read is None:
             return False
-        numbers = run.replace("f", " ").replace("/", " ").split()
-        values = np.fromiter(map(int, numbers), np.int32, len(numbers)).reshape(-1, form.width)
-        if not values[:, [0] if form.uv is None else [0, form.uv]].all():
-            return False  # whose line is to be named
+        count, position, uv = read
         self._begin_faces()
         obj = self._obj
-        obj.corner_position.frombytes(np.ascontiguousarray(values[:, 0]).tobytes())
-        uv = np.zeros(len(values), np.int32) if form.uv is None else np.ascontiguousarray(values[:, form.uv])
-        obj.corner_uv.frombytes(uv.tobytes())
-        obj.face_corners.extend([form.corners] * len(rows))
+        obj.corner_position.frombytes(position)
+        obj.corner_uv.frombytes(uv)
+        obj.face_corners.extend([count] * len(rows))
         obj.face_material.extend([self._material] * len(rows))
         return True
 

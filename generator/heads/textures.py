@@ -184,7 +184,7 @@ class Textures:
                 self._pixels += image.width * image.height
                 if self._pixels > MAX_PIXELS:
                     raise HeadError(f"the textures have more than {MAX_PIXELS:,} pixels; make them smaller")
-                self._alpha[path] = _alpha(image)
+                self._alpha[path] = _alpha_of(path, image)
         return self._alpha[path]
 
 
@@ -225,6 +225,26 @@ def alpha_channel(path: Path) -> np.ndarray | None:
         if not image.has_transparency_data:
             return None
         return np.asarray(image.convert("RGBA").getchannel("A"))
+
+
+_SOLID: dict[tuple[Path, int, int], None] = {}
+"""Images that were decoded and found solid throughout: path, bytes, time. Expressions share theirs, and
+a head that was placed is read once more to be rendered."""
+_MOST_SOLID = 256
+
+
+def _alpha_of(path: Path, image: Image.Image) -> np.ndarray | None:
+    """uint8 [H, W], None of an image, open from path, that is solid throughout."""
+    state = path.stat()
+    known = path, state.st_size, state.st_mtime_ns
+    if known in _SOLID:
+        return None
+    alpha = _alpha(image)
+    if alpha is None:
+        if len(_SOLID) >= _MOST_SOLID:
+            _SOLID.clear()
+        _SOLID[known] = None
+    return alpha
 
 
 def _alpha(image: Image.Image) -> np.ndarray | None:

@@ -94,6 +94,25 @@ def test_an_image_is_the_same_whatever_was_rendered_before_it(renderer: Renderer
     assert len(set(together)) == len(together)
 
 
+def test_an_image_is_the_same_whatever_head_was_there_before(
+    renderer: Renderer, package: Path, marked_ball: HeadMesh, tmp_path: Path
+) -> None:
+    """What a worker keeps from head to head changes no byte."""
+    other, views = (
+        tmp_path / "other.npz",
+        Views.of([View((5.0 * k, 0.0, 0.0), CAMERA, FLAT) for k in range(3)]),
+    )
+    save_package(replace(marked_ball, vertices=marked_ball.vertices * [0.5, 1.2, 0.8]), other)
+    alone = []
+    for path in (package, other):
+        worker = Renderer(tmp_path, tmp_path / "render.log")
+        alone.append([image.read_bytes() for image in worker.render(path, views)])
+        worker.close()
+    assert alone[0] != alone[1]
+    for path, images in ((package, alone[0]), (other, alone[1]), (package, alone[0])):
+        assert [image.read_bytes() for image in renderer.render(path, views)] == images
+
+
 def test_backgrounds_follow_their_rows(renderer: Renderer, package: Path) -> None:
     colors = [(0.2, 0.4, 0.8), (0.9, 0.1, 0.3), (0.2, 0.4, 0.8)]
     views = Views(((0.0, 0.0, 0.0),) * 3, (CAMERA,), tuple(replace(FLAT, background=c) for c in colors))

@@ -56,3 +56,19 @@ def test_blocks_and_vertices_with_and_without_colour(monkeypatch: pytest.MonkeyP
         assert not parse_lines(mixed).colors
     with pytest.raises(HeadError, match="line 15 "):
         parse_lines(POINTS + UV + "f 1 2 3\n" * 6 + "f x\n")
+
+
+@pytest.mark.parametrize("shared", [0, 1 << 20])
+def test_lines_that_were_read_before_are_the_same_again(monkeypatch: pytest.MonkeyPatch, shared: int) -> None:
+    """Faces and texture coordinates are those of the head before; vertices and materials its own."""
+    monkeypatch.setattr("generator.heads.obj_lines._SHARED", shared)
+    faces = "f 1/4 2/3 3/2\nf 2/3 3/2 4/1\n"
+    first = parse_lines(f"{POINTS}{UV}usemtl a\n{faces}")
+    other = parse_lines(f"{POINTS.replace('7', '70')}{UV}usemtl b\n{faces[:14]}usemtl a\n{faces}")
+    assert list(other.corner_position) == [1, 2, 3, *first.corner_position]
+    assert list(other.corner_uv) == [4, 3, 2, *first.corner_uv] and other.uvs == first.uvs
+    assert list(other.face_material) == [0, 1, 1] and list(other.materials) == ["b", "a"]
+    assert first.positions[6] == 7 and other.positions[6] == 70
+    for _ in range(2):
+        with pytest.raises(HeadError, match="line 9 cannot be read: 'f 0 1 2'"):
+            parse_lines(f"{POINTS}{UV}f 0 1 2\n")
