@@ -15,34 +15,24 @@ import argparse
 import json
 import os
 import resource
-import subprocess
-import sys
 import tempfile
-import time
 from collections import defaultdict
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parents[1]
+from checkout import HERE, build_events
+
 GRID = ("--yaw=-50,50,10", "--pitch=-40,40,10", "--roll=-30,30,10")
 
 
 def timed_build(checkout: Path, options: list[str], out: Path) -> tuple[float, float, str]:
     """Seconds of the rendering stage, CPU seconds of everything, digest."""
-    command = [sys.executable, "-m", "generator.cli", "build", *options, "--out", str(out), "--json"]
-    environment = {**os.environ, "PYTHONPATH": str(checkout)}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began = ended = 0.0
-    with subprocess.Popen(
-        command, cwd=checkout, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    ) as process:
-        for line in process.stdout or ():
-            event = json.loads(line)
-            if event["event"] == "stage" and event["stage"] == "rendering":
-                began = time.perf_counter()
-            if event["event"] == "unit":
-                ended = time.perf_counter()
-    if process.returncode:
-        raise SystemExit(f"{checkout}: {' '.join(command)} ended with {process.returncode}")
+    for when, event in build_events(checkout, options, out):
+        if event["event"] == "stage" and event["stage"] == "rendering":
+            began = when
+        if event["event"] == "unit":
+            ended = when
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return ended - began, cpu, json.loads((out / "manifest.json").read_text())["digest"]

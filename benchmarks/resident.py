@@ -19,6 +19,8 @@ class Resident(threading.Thread):
         super().__init__(daemon=True)
         self.curves: dict[tuple[int, str], list[tuple[float, float]]] = {}
         """(pid, kind of process) -> (seconds since the start, MiB)."""
+        self.most = 0.0
+        """MiB of all of them together at most; pages that they share count each time."""
         self._root, self._every_s = psutil.Process(of), every_s
         self._began = time.perf_counter()
         self._stop_now = threading.Event()
@@ -30,6 +32,7 @@ class Resident(threading.Thread):
                 children = self._root.children(recursive=True)
             except psutil.NoSuchProcess:
                 return
+            together = 0.0
             for child in [self._root, *children]:
                 try:
                     words = child.cmdline()
@@ -39,7 +42,9 @@ class Resident(threading.Thread):
                     sample = (time.perf_counter() - self._began, child.memory_info().rss / MIB)
                 except (psutil.NoSuchProcess, psutil.ZombieProcess, IndexError):
                     continue  # it ended between being listed and being asked
+                together += sample[1]
                 self.curves.setdefault((child.pid, kind), []).append(sample)
+            self.most = max(self.most, together)
 
     def stop(self) -> None:
         """Stop sampling."""
