@@ -214,6 +214,13 @@ def test_macro_weights_are_products_that_sum_to_one() -> None:
         assert sum(identity.ethnicity[race] for race in ETHNICITIES) == pytest.approx(1)
 
 
+def test_of_a_target_the_vertices_asked_for_are_read() -> None:
+    indices, offsets = source.target("chin/chin-cleft-incr")
+    some = indices[::3]
+    kept, moved = source.target("chin/chin-cleft-incr", frozenset(map(str, some.tolist())))
+    assert np.array_equal(kept, some) and np.array_equal(moved, offsets[::3])
+
+
 def test_missing_data_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     source.data_folder.cache_clear()

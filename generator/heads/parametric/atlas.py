@@ -123,19 +123,26 @@ def _rasterise(corners: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     a, ab, ac = pixels[:, 0], pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
     area = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1]
     width, height = np.maximum(high - low + 1, 0).T * (area != 0)
-    # Every texel of every triangle's box, row by row.
-    owner = np.repeat(np.arange(len(corners), dtype=np.int32), width * height)
+    drawn = np.flatnonzero(width * height)
+    a, ab, ac, low, area, width, height = (x[drawn] for x in (a, ab, ac, low, area, width, height))
+    # Every texel of every triangle's box, row by row; weights as affine functions of the place in the box.
+    owner = np.repeat(np.arange(len(drawn)), width * height)
     place = np.arange(len(owner)) - np.repeat(np.cumsum(width * height) - width * height, width * height)
     down, across = np.divmod(place, width[owner])
-    x, y = low[owner, 0] + across, low[owner, 1] + down
-    dx, dy = x - a[owner, 0], y - a[owner, 1]
-    second = (dx * ac[owner, 1] - ac[owner, 0] * dy) / area[owner]
-    third = (ab[owner, 0] * dy - dx * ab[owner, 1]) / area[owner]
+    texel = (low[:, 1] * size + low[:, 0])[owner] + down * size + across
+    corner = low - a
+    second, third = (
+        (start[owner] + right[owner] * across + lower[owner] * down)
+        for start, right, lower in (
+            ((corner[:, 0] * ac[:, 1] - ac[:, 0] * corner[:, 1]) / area, ac[:, 1] / area, -ac[:, 0] / area),
+            ((ab[:, 0] * corner[:, 1] - corner[:, 0] * ab[:, 1]) / area, -ab[:, 1] / area, ab[:, 0] / area),
+        )
+    )
     hit = (second >= -1e-6) & (third >= -1e-6) & (second + third <= 1 + 1e-6)
-    texel, second, third = (y * size + x)[hit], second[hit], third[hit]
+    texel, second, third = texel[hit], second[hit], third[hit]
     triangle = np.full(size * size, -1, dtype=np.int32)
     weights = np.zeros((size * size, 3), dtype=np.float32)
-    triangle[texel] = owner[hit]
+    triangle[texel] = drawn[owner[hit]]
     weights[texel] = np.stack([1 - second - third, second, third], axis=-1)
     return triangle.reshape(size, size), weights.reshape(size, size, 3)
 

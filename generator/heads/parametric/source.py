@@ -89,7 +89,7 @@ def target(name: str, among: frozenset[str] | None = None) -> tuple[np.ndarray, 
         text = _read(f"{FACE_UNITS}/{name.removeprefix('unit:')}.target")
     else:
         text = _read(f"{TARGETS}/{name}.target.gz")
-    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if among is not None:
         lines = [line for line in lines if line.split(None, 1)[0] in among]
     rows = np.array(" ".join(lines).split(), dtype=np.float64).reshape(-1, 4)

@@ -69,7 +69,8 @@ def refine_quads(
     triangles = [_triangulate(fine)]
     corners = [_triangulate(fine_uv)]
     face = [np.repeat(np.flatnonzero(chosen), 8)]
-    touched = np.array([any(tuple(e) in midpoint for e in _edges(quads[f : f + 1]).tolist()) for f in rest])
+    sides = _edges(quads[rest])
+    touched = np.isin(sides @ (count, 1), edges @ (count, 1)).reshape(-1, 4).any(1)
     plain = rest[~touched]
     triangles.append(_triangulate(quads[plain]))
     corners.append(_triangulate(quad_uv[plain]))

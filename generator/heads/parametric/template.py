@@ -238,9 +238,9 @@ def _close_neck(
     skin = np.flatnonzero(part == PARTS.index("skin"))
     edges = np.concatenate([triangles[skin][:, [i, (i + 1) % 3]] for i in range(3)])
     edge_uv = np.concatenate([triangle_uv[skin][:, [i, (i + 1) % 3]] for i in range(3)])
-    seen = {(int(a), int(b)) for a, b in edges}
+    count = len(canonical)
     low = canonical[edges].mean(1)[:, 1] < 6.4
-    rim = [k for k, (a, b) in enumerate(edges) if low[k] and (int(b), int(a)) not in seen]
+    rim = np.flatnonzero(low & ~np.isin(edges[:, 1] * count + edges[:, 0], edges[:, 0] * count + edges[:, 1]))
     centre = refine.shape[0]
     loop = np.unique(edges[rim])
     mean = csr_matrix(refine[loop].mean(axis=0))
