@@ -24,6 +24,7 @@ from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, angles_from_rotati
 from generator.heads.parametric.folder import head_triangles
 from generator.heads.parametric.make import make_heads
 from generator.heads.source import find_heads
+from generator.landmarks.facing import facing
 from generator.landmarks.shared import SharedAnchors, write_shared
 from generator.landmarks.topology import FACE_MESH
 from generator.placing.placer import Placer, own_anchors
@@ -62,6 +63,11 @@ def report(found: list[OwnAnchors], shared: SharedAnchors) -> None:
         own = head.mesh.vertices[head.mesh.triangles[head.anchors.triangles]]
         own = (head.anchors.weights[:, :, None] * own).sum(1)
         apart.append(np.linalg.norm(own - shared.points(head.mesh.vertices, head.mesh.triangles), axis=1))
+    level = graphics_rotation(np.reshape(shared.correction, (3, 3)))
+    surface = facing(shared.anchors.points @ level.T, FACE_MESH)
+    assert surface is not None, "all points are there"
+    print("at pose zero level the detector reads 0.00 degrees of pitch on average, by construction; ", end="")
+    print(f"the mean face fitted to the surface points reads {angles_from_rotation(surface)[1]:.2f}")
     zeros = angles_from_rotation(graphics_rotation(np.stack([head.correction for head in found])))
     print(f"{len(found)} heads, {shared.anchors.views} detections")
     print(f"single heads' anchors from the shared: median {np.nanmedian(apart):.2f} mm, ", end="")
@@ -70,7 +76,7 @@ def report(found: list[OwnAnchors], shared: SharedAnchors) -> None:
     between = np.linalg.norm((halves[0] - halves[0].mean(0)) - (halves[1] - halves[1].mean(0)), axis=1)
     print(f"those of half of the heads from those of the others: median {np.median(between):.2f} mm")
     for name, values in zip(("yaw", "pitch", "roll"), zeros.T, strict=True):
-        print(f"zero, {name}: mean {values.mean():.2f} degrees, sd {values.std(ddof=1):.2f} a head")
+        print(f"axes to level, {name}: mean {values.mean():.2f} degrees, sd {values.std(ddof=1):.2f} a head")
 
 
 def level_pitch(model: Path) -> float:

@@ -29,7 +29,7 @@ class Weights:
 
     range_deg: float [3, 2], the angles trained on. confidence: None where no face was held out to
     calibrate it. trained_subjects: whom the network has seen, so that nobody tests on them.
-    pose_zero: "source" or "canonical", of :mod:`downstream_hpe.tables.pose_zero`; None: not known.
+    pose_zero: "source", "level" or "canonical", of :mod:`downstream_hpe.tables.pose_zero`; None: not known.
     """
 
     network: PoseNetwork

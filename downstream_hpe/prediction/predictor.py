@@ -39,7 +39,7 @@ class Predictor:
 
     range_deg: float [3, 2], the angles the model was trained on; beyond them it extrapolates.
     trained_subjects: whom it has seen, so that nobody measures it on them.
-    pose_zero: "source" or "canonical", as the data it learned from; None: not known.
+    pose_zero: "source", "level" or "canonical", as the data it learned from; None: not known.
     """
 
     def __init__(

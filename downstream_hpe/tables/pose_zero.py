@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From where a dataset counts its angles: from each mesh's own zero, or from the canonical one."""
+"""From where a dataset counts its angles: each mesh's own zero, or one that its heads were turned to."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MANIFEST = "manifest.json"
 
 
 def pose_zero(dataset: Path | str) -> str | None:
-    """`--frame` of the build, "source" or "canonical"; None of files without their manifest.
+    """`--frame` of the build, "source", "level" or "canonical"; None of files without their manifest.
 
     Raises
     ------

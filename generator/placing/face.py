@@ -171,7 +171,7 @@ def _measure(
         yaw, pitch, roll = turned_deg
         notes.append(
             f"the face is turned from up {up}, forward {forward}: yaw {yaw:.0f}, pitch {pitch:.0f}, roll "
-            f"{roll:.0f} degrees, which is no pose zero; frame canonical levels it"
+            f"{roll:.0f} degrees, which is no pose zero; frame level levels it"
         )
     pivot = face.middle - [0.0, 0.0, PIVOT_DEPTH * width]
     vertices = mesh.vertices @ rotation.T

@@ -38,6 +38,10 @@ def place_heads(
     hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
     kept = PlacedHeads(root, versions, hashes)
     orders = place_orders(source, config)
+    if config.poses.frame == "canonical":
+        reporter.note(
+            "pose zero is that of earlier releases, which detectors read 5 degrees low; see --frame"
+        )
     shared = find_shared(orders, kept, executor, reporter)
     orders = [replace(order, shared=shared) for order in orders]
     reporter.stage("placing heads", len(orders))
