@@ -26,7 +26,7 @@ FUZZ_FLAGS ?=
 # The quick tests write thousands of small files: in memory, where there is room.
 QUICK_TMP = $(shell test -w /dev/shm && echo /dev/shm || echo $${TMPDIR:-/tmp})
 
-.PHONY: demo test quick model test-next test-bpy lint bench bench-addon soak fuzz audit lock extension blender clean
+.PHONY: demo test quick model test-next test-bpy lint bench bench-addon bench-heads soak fuzz audit lock extension blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -76,6 +76,9 @@ lock: $(VENV)/bin/python
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/build.py
+
+bench-heads: $(VENV)/.dev
+	$(BIN)/python benchmarks/heads.py
 
 bench-addon: $(VENV)/.dev
 	$(BIN)/python benchmarks/addon.py

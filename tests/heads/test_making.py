@@ -16,8 +16,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from generator.heads.parametric import make
-from generator.heads.parametric.make import HEADS_A_WORKER, make_heads
+from generator.heads.parametric import make, workers
+from generator.heads.parametric.make import make_heads
 from generator.pool import Spread, processes
 from generator.process import available_cores
 
@@ -29,7 +29,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="signals, limits and /proc"),
 ]
 
-COUNT = 3 * HEADS_A_WORKER
+COUNT = 3 * workers.HEADS_A_WORKER
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -42,9 +42,9 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(count)
         return processes(count, prepare)
 
-    monkeypatch.setattr(make, "HEADS_A_WORKER", 1)
-    monkeypatch.setattr(make, "worthwhile", lambda cores: 2)
-    monkeypatch.setattr(make, "processes", counted)
+    monkeypatch.setattr(workers, "HEADS_A_WORKER", 1)
+    monkeypatch.setattr(workers, "worthwhile", lambda cores: 2)
+    monkeypatch.setattr(workers, "processes", counted)
     return counts
 
 
@@ -69,7 +69,7 @@ def making(out: Path, prepare: Callable[[], None] | None = None) -> Iterator[sub
 
 def wait_for(process: subprocess.Popen[str], out: Path, heads: int) -> list[psutil.Process]:
     """Until so many heads are there. The processes that make them."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 120
     while len(list(out.glob("s5p*"))) < heads:
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
@@ -104,8 +104,8 @@ def test_stopped_leaves_whole_heads_and_no_process(tmp_path: Path, number: signa
         children = wait_for(process, tmp_path, 2)
         assert len(children) == 2
         process.send_signal(number)
-        process.wait(10)
-        assert not psutil.wait_procs(children, timeout=5)[1]
+        process.wait(30)
+        assert not psutil.wait_procs(children, timeout=20)[1]
     check_whole(tmp_path)
     folders = make_heads(tmp_path, count=3, seed=5, keep=True)
     assert all(make._is_whole(folder, "neutral") for folder in folders)
@@ -116,8 +116,8 @@ def test_a_process_that_is_killed_is_one_line(tmp_path: Path) -> None:
     with making(tmp_path) as process:
         children = wait_for(process, tmp_path, 2)
         children[0].kill()
-        _, said = process.communicate(timeout=20)
-        assert not psutil.wait_procs(children, timeout=5)[1]
+        _, said = process.communicate(timeout=60)
+        assert not psutil.wait_procs(children, timeout=20)[1]
     assert process.returncode == 1
     assert "Traceback" not in said and "was killed, perhaps for memory" in said and "--workers 1" in said
     check_whole(tmp_path)

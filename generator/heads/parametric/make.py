@@ -6,15 +6,14 @@ from __future__ import annotations
 import hashlib
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from generator.cgroup import worthwhile
-from generator.errors import HeadError, UsageError, WorkerError
+from generator.errors import HeadError, UsageError
 from generator.heads.card import CARD_NAME, MAX_CARD_BYTES
 from generator.heads.head import NEUTRAL, Made, Maker, Wish
 from generator.heads.parametric.appearance import Appearance, hair_tone, sample_appearance
@@ -27,9 +26,8 @@ from generator.heads.parametric.folder import write_description, write_materials
 from generator.heads.parametric.identity import Identity, sample_identity
 from generator.heads.parametric.skin import paint_skin
 from generator.heads.parametric.source import data_folder
+from generator.heads.parametric.workers import spread_heads
 from generator.limits import MAX_HEADS, MAX_SEED
-from generator.pool import processes
-from generator.process import available_cores
 from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
 from generator.sealed import SEAL, unsealed
 
@@ -40,9 +38,6 @@ ATTRIBUTION = (
 )
 FILES = "files"
 """Of head.json: SHA-256 of every file beside it."""
-
-HEADS_A_WORKER = 12
-"""A further process, which works out anew what heads have in common, pays from so many heads on."""
 
 _HEAD_NAME = re.compile(r"s\d+p\d{4,}")
 
@@ -96,27 +91,11 @@ def make_heads(
             missing.append(index)
         elif progress is not None:
             progress(folder.name)
-    for name in _spread(partial(_make_head, out, seed, expressions), missing, workers):
+    make = partial(_make_head, out, seed, expressions)
+    for name in spread_heads(make, missing, workers, _prepare_process):
         if progress is not None:
             progress(name)
     return folders
-
-
-def _spread(make: Callable[[int], str], missing: list[int], workers: int | None) -> Iterator[str]:
-    """The names of the heads of these numbers, in their order, each as soon as it is there."""
-    enough = 1 + len(missing) // HEADS_A_WORKER
-    workers = min(workers or enough, worthwhile(available_cores()), enough)
-    if workers < 2:
-        yield from map(make, missing)
-        return
-    try:
-        with processes(workers, _prepare_process) as spread:
-            yield from spread(make, missing, 1)
-    except WorkerError as error:
-        raise HeadError(
-            "a process that was making heads was killed, perhaps for memory; the heads that are there are "
-            "whole. Run it again with --workers 1"
-        ) from error
 
 
 def _prepare_process() -> None:
