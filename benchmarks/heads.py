@@ -85,7 +85,7 @@ def measure(checkout: Path, heads: int, poses: int, seed: int, folder: Path) -> 
     placing = stages["placing heads"]
     if (first := stages.get("looking at the first heads")) is not None:
         # Each is placed then, and only told again afterwards.
-        told = len({done for _, done in first.steps})
+        told = max((done for _, done in first.steps), default=0)
         again = [(when, done) for when, done in placing.steps if done > told]
         placing = Stage(first.began, [*first.steps, *again])
     return Cost(
