@@ -15,7 +15,7 @@ from generator.errors import HeadturnError
 
 from . import pictures, session, settings, windows
 from .core.labels import one_line
-from .core.texts import FOLDER
+from .core.texts import asks_for_folder
 
 EXTREMES = "Headturn extremes"
 SHEET_COLUMNS = 3
@@ -24,7 +24,7 @@ SHEET_COLUMNS = 3
 def source_is_named(cls: Any, context: bpy.types.Context) -> bool:
     """For a poll: is it known where the heads are?"""
     shown = context.scene.headturn
-    if shown.heads_source == FOLDER and not shown.heads_source_folder:
+    if asks_for_folder(shown.heads_source) and not shown.heads_source_folder:
         cls.poll_message_set("Choose the folder of the heads first")
         return False
     return True

@@ -9,7 +9,7 @@ import bpy
 
 from .core.numbers import Number
 from .core.panel import Row
-from .core.texts import FOLDER, Source
+from .core.texts import Source, asks_for_folder
 from .session import Shown
 
 Draw = Callable[[bpy.types.UILayout, Shown, Row], None]
@@ -60,7 +60,7 @@ def _flags(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
 
 def _source(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
     _expanded(layout, shown, row)
-    if isinstance(row.field, Source) and getattr(shown, row.field.name) == FOLDER:
+    if isinstance(row.field, Source) and asks_for_folder(getattr(shown, row.field.name)):
         layout.prop(shown, row.field.folder, text="")
 
 

@@ -60,8 +60,17 @@ HEAD_FINDERS: Registry[Any] = Registry(
 )
 """Heads on disk: a :class:`generator.heads.head.Finder`. The first that finds something reads it."""
 
-HEAD_MAKERS: Registry[Any] = Registry("--heads", {"parametric": "generator.heads.parametric.make:MAKER"})
+HEAD_MAKERS: Registry[Any] = Registry(
+    "--heads",
+    {
+        "parametric": "generator.heads.parametric.make:MAKER",
+        "ict": "generator.heads.ict.make:MAKER",
+    },
+)
 """Heads made on the spot, by ``--heads NAME`` or ``NAME:ARGUMENT``: a :class:`generator.heads.head.Maker`."""
+
+MAKERS_OF_FOLDERS = frozenset({"ict"})
+"""Makers whose ARGUMENT is a path, which counts from where the other paths of a configuration do."""
 
 DRAWS: Registry[Any] = Registry("draw", {})
 """What differs from image to image besides the pose: a :data:`generator.plan.view_plan.Draw` by the name of

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from generator.plan.head_source import is_made, split_path
 from generator.plan.settings import (
     PARAMETRIC,
     SECTIONS,
@@ -21,7 +22,6 @@ from generator.plan.settings import (
 from .config import same
 from .field import Field, Get
 from .fields import fields
-from .texts import is_made
 
 GRID, TABLE = "grid", "csv"
 
@@ -109,8 +109,8 @@ def located(config: Values, base: Path) -> Values:
     result = {name: dict(table) for name, table in config.items()}
     for setting in all_settings():
         value = result.get(setting.section, {}).get(setting.key)
-        if setting.info.path and isinstance(value, str) and value and not is_made(value):
-            result[setting.section][setting.key] = str((base / value).absolute())
+        if setting.info.path and isinstance(value, str) and (path := split_path(value)[1]):
+            result[setting.section][setting.key] = split_path(value)[0] + str((base / path).absolute())
     return result
 
 

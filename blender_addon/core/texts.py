@@ -6,11 +6,12 @@ from __future__ import annotations
 from typing import Any
 
 from generator import registries
+from generator.plan.head_source import is_made, split_path
 from generator.plan.setting import Setting
 
 from .config import join_names, same, split_names
 from .field import Field, Get, Property
-from .words import GUESSED, HELP, titled
+from .words import GUESSED, HELP, LABELS, titled
 
 GUESS = "GUESS"
 """The item of a choice that is not given."""
@@ -139,7 +140,10 @@ class Source(Field):
 
     def properties(self) -> dict[str, Property]:
         folder = ("Folder", HELP[f"{self.setting.name}:{FOLDER}"])
-        makers = ((n, titled(n), HELP.get(f"{self.setting.name}:{n}", "")) for n in registries.HEAD_MAKERS)
+        makers = (
+            (n, LABELS.get(f"{self.setting.name}:{n}", titled(n)), HELP.get(f"{self.setting.name}:{n}", ""))
+            for n in registries.HEAD_MAKERS
+        )
         items = (*makers, (FOLDER, *folder))
         words = {"name": folder[0], "description": folder[1]}
         return {
@@ -151,11 +155,13 @@ class Source(Field):
 
     def value(self, get: Get) -> Any:
         found = get(self.name)
-        return get(self.folder) if found == FOLDER else found
+        if found == FOLDER:
+            return get(self.folder)
+        return f"{found}:{get(self.folder)}" if asks_for_folder(found) else found
 
     def properties_of(self, value: Any) -> dict[str, Any]:
         if is_made(value):
-            return {self.name: value.partition(":")[0], self.folder: ""}
+            return {self.name: value.partition(":")[0], self.folder: split_path(value)[1]}
         return {self.name: FOLDER, self.folder: value}
 
     def shows(self, told: Any, value: Any) -> bool:
@@ -163,9 +169,9 @@ class Source(Field):
         return same(told, value) or (is_made(told) and told.partition(":")[0] == value)
 
 
-def is_made(source: Any) -> bool:
-    """Does a head source name a maker and no path?"""
-    return isinstance(source, str) and source.partition(":")[0] in registries.HEAD_MAKERS
+def asks_for_folder(choice: str) -> bool:
+    """Does a choice of where heads come from need a folder?"""
+    return choice == FOLDER or choice in registries.MAKERS_OF_FOLDERS
 
 
 def _items(setting: Setting) -> tuple[tuple[str, str, str], ...]:

@@ -32,8 +32,12 @@ LIMITS = {"poses.yaw": 89.9, "poses.pitch": 180.0, "poses.roll": 180.0}
 
 _RANGE = "From, to and step. Random plans use from and to"
 
+LABELS = {"heads.source:ict": "ICT-FaceKit"}
+"""Of choices whose name is no word."""
+
 HELP = {
     "heads.source:parametric": "Heads made on the spot from MakeHuman's CC0 data",
+    "heads.source:ict": "Heads made on the spot from your own copy of ICT-FaceKit, in the folder",
     "heads.source:FOLDER": "A FaceScape download, a folder of OBJ, PLY, GLB or FBX, or folders of subjects",
     "heads.source": "Where the heads come from",
     "heads.seed": "The same seed makes the same heads",

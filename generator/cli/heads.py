@@ -11,12 +11,13 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from generator import registries
 from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out, say, shown
 from generator.cli.reporter import TerminalReporter
 from generator.limits import MAX_WORKERS
-from generator.plan.settings import Heads
+from generator.plan.settings import PARAMETRIC, Heads
 
-heads_app = typer.Typer(help="Make parametric heads, or look at a head source.", no_args_is_help=True)
+heads_app = typer.Typer(help="Make heads, or look at a head source.", no_args_is_help=True)
 
 
 @heads_app.command(
@@ -29,25 +30,25 @@ def heads_make(
     expressions: Annotated[
         int, typer.Option(help="Sampled expressions each, besides the neutral face.")
     ] = Heads.sampled_expressions,
+    source: Annotated[
+        str,
+        typer.Option(help='"parametric", of MakeHuman\'s CC0 data, or "ict:PATH", of your ICT-FaceKit.'),
+    ] = PARAMETRIC,
     workers: Annotated[
         int | None, typer.Option(min=1, max=MAX_WORKERS, help="Processes; default one a core where it pays.")
     ] = None,
 ) -> None:
-    """Compose parametric heads from MakeHuman's CC0 data, as OBJ folders."""
-    from generator.heads.parametric.make import make_heads
+    """Make heads as OBJ folders."""
+    from generator.heads.head import Maker, Wish
 
+    name, _, argument = source.partition(":")
+    maker: Maker = registries.HEAD_MAKERS.get(name)
+    wish = Wish(argument, count, seed, expressions, workers, keep=False)
     with TerminalReporter(err) as reporter:
         reporter.stage("making heads", count)
-        made = make_heads(
-            folder,
-            count=count,
-            seed=seed,
-            expressions=expressions,
-            progress=lambda _: reporter.advance(),
-            workers=workers,
-        )
+        made = maker.make(folder, wish, reporter.advance)
     command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
-    say(f"{len(made)} heads in {folder}; build with: {command}")
+    say(f"{len(made.subjects)} heads in {folder}; build with: {command}")
 
 
 @heads_app.command("list", epilog="Example: headturn heads list /data/facescape")

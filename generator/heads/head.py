@@ -94,7 +94,8 @@ class Made:
 class Wish:
     """Which heads are to be made. argument: what stands behind the maker's name, such as a path.
 
-    workers: processes that may make them; None for one a core.
+    workers: processes that may make them; None for one a core. keep: may heads that are there as they
+        were made stay?
     """
 
     argument: str
@@ -102,6 +103,7 @@ class Wish:
     seed: int
     sampled_expressions: int
     workers: int | None = None
+    keep: bool = True
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from generator import registries
 from generator.errors import UsageError
 from generator.escape import shortened
+from generator.plan.head_source import is_made, split_path
 from generator.plan.setting import Choice
 from generator.plan.settings import (
     SECTIONS,
@@ -67,9 +67,9 @@ class BuildConfig:
         """The same configuration as a file in the folder root says it: relative paths count from there."""
         values = self.as_dict()
         for setting in _paths(values):
-            value = values[setting.section][setting.key]
-            if not Path(value).is_absolute():
-                values[setting.section][setting.key] = _relative(self.located(value), root)
+            before, path = split_path(values[setting.section][setting.key])
+            if not Path(path).is_absolute():
+                values[setting.section][setting.key] = before + _relative(self.located(path), root)
         return replace(_validated(values, "configuration"), base=root)
 
 
@@ -97,15 +97,9 @@ def load_config(path: Path | None, overrides: Mapping[str, Mapping[str, Any]]) -
         merged.update(changes)
     if path is not None:
         for setting in _paths(overrides):
-            values[setting.section][setting.key] = str(
-                Path(overrides[setting.section][setting.key]).absolute()
-            )
+            before, named = split_path(overrides[setting.section][setting.key])
+            values[setting.section][setting.key] = before + str(Path(named).absolute())
     return replace(_validated(values, path or "configuration"), base=base)
-
-
-def is_made(source: str) -> bool:
-    """Does a head source name a maker and no path?"""
-    return source.partition(":")[0] in registries.HEAD_MAKERS
 
 
 def recorded_config(values: Values, root: Path) -> BuildConfig:
@@ -119,9 +113,10 @@ def recorded_config(values: Values, root: Path) -> BuildConfig:
     if isinstance(poses, Mapping):
         values = {**values, "poses": {"same": True, **poses}}
     for setting in _paths(values):
-        value = Path(values[setting.section][setting.key])
+        before, path = split_path(values[setting.section][setting.key])
+        value = Path(path)
         if not value.is_absolute() and not (root / value).exists() and value.exists():
-            section = {**values[setting.section], setting.key: str(value.absolute())}
+            section = {**values[setting.section], setting.key: before + str(value.absolute())}
             values = {**values, setting.section: section}
     return replace(_validated(values, root), base=root)
 
@@ -156,8 +151,9 @@ def plain_values(section: Any) -> dict[str, Any]:
 
 def _comparable(config: BuildConfig, setting: Setting) -> Any:
     value = plain(getattr(getattr(config, setting.section), setting.key))
-    if setting.info.path and value is not None and not is_made(value):
-        return str(config.located(value))
+    if setting.info.path and value is not None:
+        before, path = split_path(value)
+        return before + str(config.located(path)) if path else value
     return value
 
 
@@ -169,7 +165,7 @@ def _paths(values: Mapping[str, Any]) -> list[Setting]:
         if known.info.path
         and isinstance(values.get(known.section), Mapping)
         and isinstance(values[known.section].get(known.key), str)
-        and not is_made(values[known.section][known.key])
+        and split_path(values[known.section][known.key])[1]
     ]
 
 

@@ -38,16 +38,17 @@ class Heads:
     """Which heads."""
 
     source: str = setting(
-        PARAMETRIC, 'A head source, or "parametric": heads made on the spot from MakeHuman\'s CC0 data',
+        PARAMETRIC, 'A head source, or heads made on the spot: "parametric", from MakeHuman\'s CC0 data, or '
+        '"ict:PATH", from your own copy of ICT-FaceKit',
         flag="--heads", label="Heads", path=True,
     )  # fmt: skip
-    count: int = setting(3, "Parametric heads to make", low=1, high=MAX_HEADS, label="Heads", grows=True)
+    count: int = setting(3, "Heads to make on the spot", low=1, high=MAX_HEADS, label="Heads", grows=True)
     seed: int = setting(
         0, "The same seed makes the same heads, and draws the same random poses",
         low=0, high=MAX_SEED, label="Seed",
     )  # fmt: skip
     sampled_expressions: int = setting(
-        0, "Sampled expressions a parametric head, besides the neutral face",
+        0, "Sampled expressions of each head that is made, besides the neutral face",
         low=0, high=1000, label="Expressions", grows=True,
     )  # fmt: skip
     subjects: tuple[str, ...] | None = setting(

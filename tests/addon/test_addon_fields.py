@@ -15,6 +15,7 @@ from blender_addon.core import config
 from blender_addon.core.field import Get
 from blender_addon.core.fields import field_of, fields
 from blender_addon.core.tables import check_shown, configuration, located, properties_of, section_of
+from blender_addon.core.texts import FOLDER, asks_for_folder
 from blender_addon.core.words import HELP, LIMITS, UNSET, titled
 from generator.errors import UsageError
 from generator.plan.config import BuildConfig, config_toml, load_config
@@ -223,6 +224,16 @@ def test_what_a_maker_is_told_is_kept() -> None:
     assert round_trip(told)["heads"]["source"] == "parametric:adults"
 
 
+def test_the_folder_of_a_maker_is_shown_and_told() -> None:
+    told: Values = {"heads": {"source": "ict:/data/kit"}}
+    properties = Properties(told)
+    assert (properties["heads_source"], properties["heads_source_folder"]) == ("ict", "/data/kit")
+    assert round_trip(told)["heads"]["source"] == "ict:/data/kit"
+    properties["heads_source_folder"] = "/data/other"
+    assert configuration(properties.getter, told)["heads"]["source"] == "ict:/data/other"
+    assert asks_for_folder("ict") and asks_for_folder(FOLDER) and not asks_for_folder("parametric")
+
+
 @pytest.mark.parametrize(
     "table",
     [
@@ -242,6 +253,8 @@ def test_what_no_property_can_say_is_named(table: Values) -> None:
 def test_paths_count_from_the_file_that_names_them(tmp_path: Path) -> None:
     found = located({"heads": {"source": "faces"}, "poses": {"path": "/p.csv"}}, tmp_path)
     assert found == {"heads": {"source": str(tmp_path / "faces")}, "poses": {"path": "/p.csv"}}
+    kit = located({"heads": {"source": "ict:kit"}}, tmp_path)["heads"]["source"]
+    assert kit == f"ict:{tmp_path / 'kit'}"
     assert located({"heads": {"source": "parametric"}}, tmp_path)["heads"]["source"] == "parametric"
 
 

@@ -16,7 +16,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from generator.heads.parametric import make, workers
+from generator.heads import made
+from generator.heads.made import HEADS_A_WORKER, is_whole
 from generator.heads.parametric.make import make_heads
 from generator.pool import Spread, processes
 from generator.process import available_cores
@@ -29,7 +30,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="signals, limits and /proc"),
 ]
 
-COUNT = 3 * workers.HEADS_A_WORKER
+COUNT = 3 * HEADS_A_WORKER
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -42,9 +43,9 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(count)
         return processes(count, prepare)
 
-    monkeypatch.setattr(workers, "HEADS_A_WORKER", 1)
-    monkeypatch.setattr(workers, "worthwhile", lambda cores: 2)
-    monkeypatch.setattr(workers, "processes", counted)
+    monkeypatch.setattr(made, "HEADS_A_WORKER", 1)
+    monkeypatch.setattr(made, "worthwhile", lambda cores: 2)
+    monkeypatch.setattr(made, "processes", counted)
     return counts
 
 
@@ -80,7 +81,7 @@ def check_whole(out: Path) -> None:
     """Every folder with a head's name is whole."""
     heads = list(out.glob("s5p*"))
     assert 2 <= len(heads) < COUNT
-    assert all(make._is_whole(head, "neutral") for head in heads)
+    assert all(is_whole(head, "neutral") for head in heads)
 
 
 def test_two_processes_make_the_same_bytes(
@@ -108,7 +109,7 @@ def test_stopped_leaves_whole_heads_and_no_process(tmp_path: Path, number: signa
         assert not psutil.wait_procs(children, timeout=20)[1]
     check_whole(tmp_path)
     folders = make_heads(tmp_path, count=3, seed=5, keep=True)
-    assert all(make._is_whole(folder, "neutral") for folder in folders)
+    assert all(is_whole(folder, "neutral") for folder in folders)
 
 
 @pytest.mark.skipif(len(available_cores()) < 2, reason="one process at work here")

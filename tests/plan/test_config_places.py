@@ -17,6 +17,7 @@ from generator.plan.config import (
     read_recorded,
     recorded_config,
 )
+from generator.plan.head_source import split_path
 
 RELATIVE = '[heads]\nsource = "scans"\n[poses]\nkind = "csv"\npath = "../poses.csv"\n'
 
@@ -77,6 +78,31 @@ def test_heads_that_are_made_have_no_place(tree: Path) -> None:
     ):
         assert config.makes_heads and config.moved_to(tree / "dataset").heads.source == "parametric"
     assert not load_config(None, {"heads": {"source": "scans"}}).makes_heads
+
+
+def test_the_folder_that_a_maker_is_told_is_a_path_like_others(tree: Path, tmp_path: Path) -> None:
+    (tree / "there" / "build.toml").write_text('[heads]\nsource = "ict:scans"\n')
+    config = load_config(tree / "there" / "build.toml", {})
+    assert config.makes_heads and copy_of(config) == tree / "there" / "scans"
+    flag: dict[str, Any] = {"heads": {"source": "ict:scans"}}
+    for here in (load_config(None, flag), load_config(tree / "there" / "build.toml", flag)):
+        assert copy_of(here) == tree / "here" / "scans" and set(differences(here, config)) == {"heads.source"}
+    assert config.moved_to(tree / "dataset").heads.source == "ict:../there/scans"
+    again = read_recorded(record(config, tree / "dataset"))
+    assert copy_of(again) == copy_of(config) and not differences(again, config)
+    moved = tree.rename(tmp_path / "moved")
+    assert copy_of(read_recorded(moved / "dataset" / "config.toml")) == moved / "there" / "scans"
+
+
+def test_a_maker_of_folders_without_one_has_no_path(tree: Path) -> None:
+    for source in ("ict:", "ict", "parametric:adults"):
+        config = load_config(None, {"heads": {"source": source}})
+        assert config.makes_heads and config.moved_to(tree / "dataset").heads.source == source
+
+
+def copy_of(config: BuildConfig) -> Path:
+    """Where the folder lies that a maker is told."""
+    return config.located(split_path(config.heads.source)[1])
 
 
 def record(config: BuildConfig, root: Path) -> Path:

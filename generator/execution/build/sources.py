@@ -12,6 +12,7 @@ from generator.execution.status import Progress
 from generator.heads.head import HeadSource, Made, Maker, Wish
 from generator.heads.source import find_heads
 from generator.plan.config import BuildConfig
+from generator.plan.head_source import split_path
 
 
 def find_source(
@@ -61,6 +62,8 @@ def source_path(config: BuildConfig, root: Path) -> Path:
 def _make(config: BuildConfig, path: Path, reporter: Progress, workers: int | None) -> Made:
     heads = config.heads
     name, _, argument = heads.source.partition(":")
+    if path_named := split_path(heads.source)[1]:
+        argument = str(config.located(path_named))
     maker: Maker = registries.HEAD_MAKERS.get(name)
     reporter.stage("making heads", heads.count)
     wish = Wish(argument, heads.count, heads.seed, heads.sampled_expressions, workers)

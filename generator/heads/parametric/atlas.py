@@ -25,7 +25,7 @@ ATLASES = 2
 """Of how many atlases paint keeps what it worked out, in one process."""
 
 _OCCLUSION_RADIUS = 0.35
-_LID_REACH, _LIP_REACH = 0.15, 0.2  # No paint looks farther.
+LID_REACH, LIP_REACH = 0.15, 0.2  # No paint looks farther.
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,33 +63,55 @@ class Atlas:
 def head_atlas() -> Atlas:
     """Rasterise the template into its texture. Less than a second, once a process."""
     template = head_template()
-    triangle, weights = _rasterise(template.uv[template.triangle_uv], ATLAS_SIZE)
-    inside = np.flatnonzero(triangle.ravel() >= 0)
-    triangle, weights = triangle.ravel()[inside], weights.reshape(-1, 3)[inside]
-    nearest = _nearest(inside, ATLAS_SIZE)
+    texels = texels_in_use(template.uv[template.triangle_uv])
+    points = texels.blend(template.canonical, template.triangles)
+    source_uv = texels.blend(template.source_uv, template.triangle_uv)
+    part = template.part[texels.triangle].astype(np.int8)
+    skin = part == PARTS.index("skin")
+    lid, lips = (
+        along_loop(template.canonical, template.triangles, loop)
+        for loop in (template.lid_margin, template.lip_margin)
+    )
+    return texels.atlas(
+        points=points,
+        part=part,
+        occlusion=texels.blend(_occlusion(template), template.triangles),
+        lid=distance_to(lid, points, LID_REACH),
+        lip_seam=distance_to(lips, points, LIP_REACH),
+        lips=_mask("lips", source_uv) * skin,
+        ears=_mask("ears", source_uv) * skin,
+    )
 
-    def blend(values: np.ndarray, corners: np.ndarray) -> np.ndarray:
-        """Values [N, ...] of vertices at the texels inside."""
+
+@dataclass(frozen=True)
+class Texels:
+    """The K texels of an atlas that lie in a triangle, int [K]; weights float32 [K, 3] of its corners.
+
+    nearest: of every texel [H, W] the place among them of the nearest one.
+    """
+
+    triangle: np.ndarray
+    weights: np.ndarray
+    nearest: np.ndarray
+
+    def blend(self, values: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """float32 [K, ...]: values [N, ...] of vertices, which corners int [T, 3] name, at each texel."""
         values, column = values.astype(np.float32), (-1, *[1] * (values.ndim - 1))
         first, second, third = (
-            values[corners[triangle, k]] * weights[:, k].reshape(column) for k in range(3)
+            values[corners[self.triangle, k]] * self.weights[:, k].reshape(column) for k in range(3)
         )
         return first + second + third
 
-    points = blend(template.canonical, template.triangles)
-    source_uv = blend(template.source_uv, template.triangle_uv)
-    part = template.part[triangle].astype(np.int8)
-    skin = part == PARTS.index("skin")
-    facts = {
-        "points": points,
-        "part": part,
-        "occlusion": blend(_occlusion(template), template.triangles),
-        "lid": _distance(points, _dense(template, template.lid_margin), _LID_REACH),
-        "lip_seam": _distance(points, _dense(template, template.lip_margin), _LIP_REACH),
-        "lips": _mask("lips", source_uv) * skin,
-        "ears": _mask("ears", source_uv) * skin,
-    }
-    return Atlas(**{name: values[nearest] for name, values in facts.items()})
+    def atlas(self, **facts: np.ndarray) -> Atlas:
+        """An atlas of its fields as [K, ...]."""
+        return Atlas(**{name: values[self.nearest] for name, values in facts.items()})
+
+
+def texels_in_use(corners: np.ndarray) -> Texels:
+    """The texels inside of triangles, whose corners are float [T, 3, 2] in the atlas, v up."""
+    triangle, weights = _rasterise(corners, ATLAS_SIZE)
+    inside = np.flatnonzero(triangle.ravel() >= 0)
+    return Texels(triangle.ravel()[inside], weights.reshape(-1, 3)[inside], _nearest(inside, ATLAS_SIZE))
 
 
 def _nearest(inside: np.ndarray, size: int) -> np.ndarray:
@@ -102,7 +124,7 @@ def _nearest(inside: np.ndarray, size: int) -> np.ndarray:
     return place[rows * size + columns]
 
 
-def _distance(points: np.ndarray, loop: np.ndarray, limit: float) -> np.ndarray:
+def distance_to(loop: np.ndarray, points: np.ndarray, limit: float) -> np.ndarray:
     """Distance of points [N, 3] to those of a loop [K, 3], at most limit, float32 [N]."""
     near = ((points > loop.min(0) - limit) & (points < loop.max(0) + limit)).all(1)
     distance = np.full(len(points), limit, dtype=np.float32)
@@ -147,13 +169,16 @@ def _rasterise(corners: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     return triangle.reshape(size, size), weights.reshape(size, size, 3)
 
 
-def _dense(template: HeadTemplate, loop: np.ndarray) -> np.ndarray:
-    """Points every quarter along the edges that join the loop's vertices, [K, 3]."""
-    member = np.zeros(len(template.canonical), dtype=bool)
+def along_loop(points: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Points every quarter along the edges that join a loop's vertices, [K, 3].
+
+    points: [V, 3]. triangles: int [T, 3]. loop: int, vertices.
+    """
+    member = np.zeros(len(points), dtype=bool)
     member[loop] = True
-    edges = np.concatenate([template.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     edges = edges[member[edges].all(1)]
-    a, b = template.canonical[edges].transpose(1, 0, 2)
+    a, b = points[edges].transpose(1, 0, 2)
     return np.concatenate([a + (b - a) * t for t in (0, 0.25, 0.5, 0.75)])
 
 

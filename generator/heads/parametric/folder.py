@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A parametric head on disk: OBJ, MTL, PNG and head.json, the same bytes for the same head."""
+"""The files of a parametric head: OBJ, MTL and PNG, the same bytes for the same head."""
 
 from __future__ import annotations
 
-import json
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from generator.heads.obj_write import topology_lines, write_obj
 from generator.heads.parametric.curtain import curtain_topology
 from generator.heads.parametric.eyes import eyeball_topology
 from generator.heads.parametric.png import png_bytes
 from generator.heads.parametric.template import PARTS, head_template
-from generator.sealed import sealed
 
 MATERIAL_FILE = "head.mtl"
 _MATERIALS = """\
@@ -26,6 +25,7 @@ map_Kd eye.png
 newmtl lash
 Kd {:.4f} {:.4f} {:.4f}
 """
+_NAMES = ("skin", "eye", "lash", "hair")
 _HAIR_MATERIAL = """\
 newmtl hair
 Kd 1 1 1
@@ -35,8 +35,7 @@ map_Kd hair.png
 
 def write_mesh(path: Path, vertices: np.ndarray, long_hair: bool) -> None:
     """Write vertices [N, 3] in mm with their triangles as OBJ (micrometres kept)."""
-    lines = b"v %.3f %.3f %.3f\n" * len(vertices) % tuple(vertices.ravel().tolist())
-    path.write_bytes(b"mtllib %s\n" % MATERIAL_FILE.encode() + lines + _topology(long_hair))
+    write_obj(path, MATERIAL_FILE, vertices, _topology(long_hair))
 
 
 def write_materials(folder: Path, lash_color: np.ndarray, long_hair: bool) -> None:
@@ -48,11 +47,6 @@ def write_materials(folder: Path, lash_color: np.ndarray, long_hair: bool) -> No
 def write_texture(path: Path, pixels: np.ndarray) -> None:
     """Write uint8 [H, W, 3] as PNG without any metadata."""
     path.write_bytes(png_bytes(pixels))
-
-
-def write_description(path: Path, description: dict) -> None:
-    """Write head.json, with a checksum of itself."""
-    path.write_text(json.dumps(sealed(description), indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def head_triangles(long_hair: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -81,11 +75,5 @@ def _topology(long_hair: bool) -> bytes:
     """The part of the OBJ that all heads share."""
     triangles, corners, names = head_triangles(long_hair)
     uv = [head_template().uv, eyeball_topology()[1]] + ([curtain_topology()[1]] if long_hair else [])
-    text = [f"vt {u:.6f} {v:.6f}\n" for u, v in np.concatenate(uv).tolist()]
-    both = np.stack([triangles, corners], axis=-1).reshape(-1, 6) + 1
-    for name in ("skin", "eye", "lash", "hair"):
-        rows = both[names == name].tolist()
-        if rows:
-            text.append(f"usemtl {name}\n")
-            text += [f"f {a}/{au} {b}/{bu} {c}/{cu}\n" for a, au, b, bu, c, cu in rows]
-    return "".join(text).encode("ascii")
+    groups = ((name, triangles[names == name], corners[names == name]) for name in _NAMES)
+    return topology_lines(np.concatenate(uv), groups)

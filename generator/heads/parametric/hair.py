@@ -47,15 +47,22 @@ def _hairline(look: Appearance) -> np.ndarray:
 def hair_volume(vertices: np.ndarray, look: Appearance, rng: np.random.Generator) -> np.ndarray:
     """Offsets [V, 3], dm, that lift the scalp of a neutral head by its hair."""
     template = head_template()
-    height = hair_height(template.canonical, look)
-    rise = smoothstep(-0.02, 0.38, height) * smoothstep(0.03, 0.22, _ear_distance())
-    top = 0.55 + 0.45 * smoothstep(7.6, 8.3, template.canonical[:, 1])
-    lumps = 1 + 0.22 * smooth_noise(rng, tuple(template.canonical.T * 3.0 + rng.uniform(0, 8)))
     skin = template.triangles[template.part == PARTS.index("skin")]
     normals, _ = vertex_normals(vertices, skin)
-    lift = look.volume_mm / 100 * rise * top * lumps
+    lift = hair_lift(template.canonical, _ear_distance(), look, rng)
     lift[~np.isin(np.arange(len(lift)), skin)] = 0
     return normals * lift[:, None]
+
+
+def hair_lift(
+    points: np.ndarray, ear_distance: np.ndarray, look: Appearance, rng: np.random.Generator
+) -> np.ndarray:
+    """How far hair stands off the scalp, dm, [V], at canonical points [V, 3] so far from the ears, dm [V]."""
+    height = hair_height(points, look)
+    rise = smoothstep(-0.02, 0.38, height) * smoothstep(0.03, 0.22, ear_distance)
+    top = 0.55 + 0.45 * smoothstep(7.6, 8.3, points[:, 1])
+    lumps = 1 + 0.22 * smooth_noise(rng, tuple(points.T * 3.0 + rng.uniform(0, 8)))
+    return look.volume_mm / 100 * rise * top * lumps
 
 
 @lru_cache(maxsize=1)

@@ -8,8 +8,10 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from generator.geometry.rigid import fit_similarity
+from generator.heads.parametric.real_shape import PREFIX, real_shape
 from generator.heads.parametric.source import base_mesh, target
-from generator.heads.parametric.template import head_template
+from generator.heads.parametric.template import PARTS, head_template
 
 ETHNICITIES = ("african", "asian", "caucasian")
 
@@ -103,6 +105,9 @@ _DETAILS = (
 _MEANS = {"mouth/mouth-angles": 0.12, "eyes/{side}-eye-height2": 0.08}
 """Details whose average is not 0: MakeHuman's neutral face looks stern."""
 
+DETAIL_SHARE = 0.7
+"""Of the standard deviations above: much of how faces vary is in the factors of real faces."""
+
 DETAIL_LIMIT = 2.0
 """Details stay within this many standard deviations (a full target is 1)."""
 
@@ -118,8 +123,8 @@ class Identity:
     """One person's shape parameters.
 
     gender: 0 female to 1 male. age_years: 20-75. muscle, weight: 0-1, 0.5 average.
-    ethnicity: weights of ETHNICITIES, sum 1. targets: MakeHuman detail targets and
-    their weights.
+    ethnicity: weights of ETHNICITIES, sum 1. targets: MakeHuman detail targets, and those of
+    :mod:`generator.heads.parametric.real_shape`, and their weights.
     """
 
     gender: float
@@ -145,7 +150,7 @@ def sample_identity(rng: np.random.Generator) -> Identity:
     shape = rng.dirichlet([0.16 if name in rare else 0.4 for name in HEAD_SHAPES]) * rng.uniform(0.1, 0.5)
     targets |= {f"head/head-{n}": float(v) for n, v in zip(HEAD_SHAPES, shape, strict=True) if v > 0.02}
     for name, negative, positive, deviation in _DETAILS:
-        value = _normal(rng, deviation) + _MEANS.get(name, 0.0)
+        value = DETAIL_SHARE * _normal(rng, deviation) + _MEANS.get(name, 0.0)
         sides = ("l", "r") if "{side}" in name else ("",)
         for side in sides:
             own = value + (rng.normal(0, PAIR_JITTER) if side else 0.0)
@@ -154,12 +159,27 @@ def sample_identity(rng: np.random.Generator) -> Identity:
     for name in _ASYMMETRY:
         side = "l" if rng.random() < 0.5 else "r"
         targets[f"asym/asym-{name}-{side}"] = float(rng.uniform(0, ASYMMETRY_LIMIT))
+    for name in real_shape().targets:
+        targets[name] = _normal(rng, 1.0)
     return Identity(gender, age_years, muscle, weight, dict(sorted(ethnicity.items())), targets)
 
 
 def identity_vertices(identity: Identity) -> np.ndarray:
-    """Vertices of the identity in source numbering, float64 [S, 3] dm."""
-    return apply_targets(base_vertices(), macro_weights(identity) | identity.targets)
+    """Vertices of the identity in source numbering, float64 [S, 3] dm; the face is level."""
+    base = base_vertices()
+    return levelled(apply_targets(base, macro_weights(identity) | identity.targets), base)
+
+
+def levelled(vertices: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Vertices [S, 3] dm turned so that their face is as level as another's, which has no expression.
+
+    MakeHuman's people hold their heads by sex, age and ethnicity as much as 6 degrees up or down,
+    which would be an error of their labels: pose zero is where the face is level.
+    """
+    front = _front_rows()
+    turn = fit_similarity(vertices[front], base[front]).rotation
+    middle = vertices[front].mean(0)
+    return (vertices - middle) @ turn.T + middle
 
 
 def macro_weights(identity: Identity) -> dict[str, float]:
@@ -194,25 +214,46 @@ def apply_targets(vertices: np.ndarray, weights: dict[str, float]) -> np.ndarray
 
 @lru_cache(maxsize=1)
 def base_vertices() -> np.ndarray:
-    """The base mesh in source numbering, float64 [S, 3] dm."""
-    return base_mesh().vertices[head_template().source_vertices]
+    """The base mesh, shaped like people on average, in source numbering, float64 [S, 3] dm."""
+    vertices = base_mesh().vertices[head_template().source_vertices]
+    shape = real_shape()
+    vertices[_source_rows()[shape.vertices]] += shape.correction
+    return vertices
 
 
 @cache
 def head_target(name: str) -> tuple[np.ndarray, np.ndarray]:
     """A target cut to the head: rows in source numbering [K], offsets [K, 3] dm."""
-    lookup, written = _head_numbers()
-    indices, offsets = target(name, written)
-    return lookup[indices], offsets
+    if name.startswith(PREFIX):
+        shape = real_shape()
+        return _source_rows()[shape.vertices], shape.targets[name]
+    indices, offsets = target(name, _written_numbers())
+    return _source_rows()[indices], offsets
 
 
 @lru_cache(maxsize=1)
-def _head_numbers() -> tuple[np.ndarray, frozenset[str]]:
-    """Number of a vertex of the base mesh in source numbering; the numbers that have one, as written."""
+def _written_numbers() -> frozenset[str]:
+    """Vertices of the base mesh that the head uses, as they are written in target files."""
+    return frozenset(map(str, head_template().source_vertices.tolist()))
+
+
+@lru_cache(maxsize=1)
+def _front_rows() -> np.ndarray:
+    """Vertices of the face's skin from chin to forehead, int [K]: as dense as the face is detailed."""
+    template = head_template()
+    skin = template.triangles[template.part == PARTS.index("skin")]
+    rows = np.unique(template.refine[np.unique(skin)].indices)
+    x, y, z = base_mesh().vertices[template.source_vertices[rows]].T
+    return rows[(z > 1.0) & (y > 6.2) & (y < 8.0) & (np.abs(x) < 0.6)]
+
+
+@lru_cache(maxsize=1)
+def _source_rows() -> np.ndarray:
+    """Source numbering of every vertex of the base mesh, -1 where the head does not use it."""
+    rows = np.full(len(base_mesh().vertices), -1)
     source = head_template().source_vertices
-    lookup = np.full(len(base_mesh().vertices), -1)
-    lookup[source] = np.arange(len(source))
-    return lookup, frozenset(map(str, source.tolist()))
+    rows[source] = np.arange(len(source))
+    return rows
 
 
 def parameter_table() -> list[tuple[str, str, str]]:
@@ -226,11 +267,13 @@ def parameter_table() -> list[tuple[str, str, str]]:
         ("head/head-{shape}", "0 to 0.5 together", ", ".join(HEAD_SHAPES)),
     ]
     for name, negative, positive, deviation in _DETAILS:
-        limit, mean = DETAIL_LIMIT * deviation, _MEANS.get(name, 0.0)
+        limit, mean = DETAIL_LIMIT * DETAIL_SHARE * deviation, _MEANS.get(name, 0.0)
         span = f"{mean - limit:.2f} to {mean + limit:.2f}"
         rows.append((f"{name}-{negative}/{positive}", span, "detail target"))
     for name in _ASYMMETRY:
         rows.append((f"asym/asym-{name}-l/r", f"0 to {ASYMMETRY_LIMIT}", "slight asymmetry"))
+    span = f"-{DETAIL_LIMIT:g} to {DETAIL_LIMIT:g}"
+    rows += [(name, span, "factor of how real faces vary") for name in real_shape().targets]
     return rows
 
 

@@ -13,19 +13,19 @@ import zlib
 import numpy as np
 
 _UP = 2  # PNG specification (ISO/IEC 15948), 9.2
-_RGB = 2
+_COLOR_TYPES = {3: 2, 4: 6}  # of so many channels
 
 
 def png_bytes(pixels: np.ndarray) -> bytes:
-    """uint8 [H, W, 3] as a PNG file without any metadata."""
-    height, width, _ = pixels.shape
-    rows = pixels.reshape(height, width * 3)
-    lines = np.empty((height, 1 + width * 3), dtype=np.uint8)
+    """uint8 [H, W, 3], or 4 with alpha, as a PNG file without any metadata."""
+    height, width, channels = pixels.shape
+    rows = pixels.reshape(height, width * channels)
+    lines = np.empty((height, 1 + width * channels), dtype=np.uint8)
     lines[:, 0] = _UP
     lines[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=lines[1:, 1:])
     packer = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, zlib.Z_HUFFMAN_ONLY)
-    header = struct.pack(">IIBBBBB", width, height, 8, _RGB, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 8, _COLOR_TYPES[channels], 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", packer.compress(lines.data) + packer.flush()), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
 
