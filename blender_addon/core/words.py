@@ -38,7 +38,7 @@ LABELS = {"heads.source:ict": "ICT-FaceKit"}
 HELP = {
     "heads.source:parametric": "Heads made on the spot from MakeHuman's CC0 data",
     "heads.source:ict": "Heads made on the spot from your own copy of ICT-FaceKit, in the folder",
-    "heads.source:FOLDER": "A FaceScape download, a folder of OBJ, PLY, GLB or FBX, or folders of subjects",
+    "heads.source:FOLDER": "A FaceScape download, a folder of OBJ, PLY, GLB, FBX, DAE, USD, or of subjects",
     "heads.source": "Where the heads come from",
     "heads.seed": "The same seed makes the same heads",
     "heads.subjects": "Only these, separated by commas. Empty: all of them",

@@ -11,12 +11,31 @@ from typing import Any
 import bpy
 from bpy_extras import image_utils
 
+from generator.blender.usd_layers import plain_layer
 from generator.errors import HeadError
 from generator.heads.paths import find_below
 
+_USD = {
+    **dict.fromkeys(("import_cameras", "import_curves", "import_lights", "import_volumes"), False),
+    **dict.fromkeys(("import_points", "import_shapes", "import_blendshapes", "import_subdiv"), False),
+    **dict.fromkeys(("import_guide", "import_proxy", "support_scene_instancing"), False),
+    **dict.fromkeys(("create_world_material", "set_frame_range", "set_material_blend"), False),
+    **dict.fromkeys(("import_materials", "import_meshes", "import_skeletons", "validate_meshes"), True),
+    **dict.fromkeys(("import_render", "import_visible_only", "import_usd_preview"), True),
+    "apply_unit_conversion_scale": True,
+    "import_textures_mode": "IMPORT_NONE",
+    "scale": 1.0,
+}
+"""What a head is of a USD stage; a Blender knows only some of them."""
 
-def import_mesh(path: Path) -> None:
-    """Read a file into the empty scene, in the pose it is stored in. ValueError: no importer for it."""
+
+def import_mesh(path: Path) -> dict[str, str]:
+    """Read a file into the empty scene, in the pose it is stored in. ValueError: no importer for it.
+
+    Returns
+    -------
+    By the names of images that stand for others, what the file says; of most formats nothing.
+    """
     match path.suffix.lower():
         case ".fbx":
             with _images_from(path.parent):
@@ -24,8 +43,15 @@ def import_mesh(path: Path) -> None:
         case ".glb":
             # Of generator.heads.gltf_draco: it names no other file.
             bpy.ops.import_scene.gltf(filepath=str(path))
+        case ".usda" | ".usdc":
+            plain, names = plain_layer(path, path.parent)
+            known = set(bpy.ops.wm.usd_import.get_rna_type().properties.keys())
+            options = {key: value for key, value in _USD.items() if key in known}
+            bpy.ops.wm.usd_import(filepath=str(plain), **options)
+            return names
         case suffix:
             raise ValueError(f"no importer for {suffix}")
+    return {}
 
 
 def export_glb(path: Path) -> None:

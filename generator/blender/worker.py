@@ -43,7 +43,7 @@ def _import_package_beside_this_file() -> None:
 if "generator" not in sys.modules and not __package__:
     _import_package_beside_this_file()
 
-from generator.process import end_with_parent  # noqa: E402
+from generator.process import end_with_parent, limited_memory  # noqa: E402
 
 if __name__ == "__main__":
     end_with_parent()  # before bpy, which takes a second to load: its host may die in it
@@ -53,6 +53,7 @@ from generator.blender.clearing import clear  # noqa: E402
 from generator.blender.crop import Backdrops  # noqa: E402
 from generator.blender.images import Images  # noqa: E402
 from generator.blender.importing import export_glb, import_mesh  # noqa: E402
+from generator.errors import HeadError  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
 from generator.messages import (  # noqa: E402
     ConvertOrder,
@@ -64,6 +65,9 @@ from generator.messages import (  # noqa: E402
     from_json,
     to_json,
 )
+
+MAX_IMPORT_MIB = 8192
+"""What a file may unpack to that is larger than it looks, of which its importer believes what it says."""
 
 Answer = Callable[[Any], None]
 """Takes each message of the worker."""
@@ -108,8 +112,10 @@ class RenderWorker:
     def _convert(self, order: ConvertOrder) -> None:
         self._loaded = None
         clear()
-        import_mesh(Path(order.source))
-        export_glb(Path(order.target))
+        with limited_memory(MAX_IMPORT_MIB):
+            names = import_mesh(Path(order.source))
+            export_glb(Path(order.target))
+        Path(order.target).with_suffix(".json").write_text(json.dumps(names), encoding="utf-8")
 
 
 def main(threads: int) -> None:
@@ -132,7 +138,8 @@ def main(threads: int) -> None:
         except Exception as error:
             # The boundary of the process: the whole story goes to the log, one line to the host.
             traceback.print_exc()
-            answer(OrderFailed(f"{type(error).__name__}: {' '.join(str(error).split())}"))
+            what = "" if isinstance(error, HeadError) else f"{type(error).__name__}: "
+            answer(OrderFailed(f"{what}{' '.join(str(error).split())}"))
 
 
 def _named(order: Any) -> str:

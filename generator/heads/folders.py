@@ -9,7 +9,9 @@ from pathlib import Path
 
 from generator.errors import HeadError
 from generator.escape import printable
+from generator.heads import usd
 from generator.heads.card import CARD_NAME, HeadCard, read_card
+from generator.heads.collada import collada_files
 from generator.heads.fbx import check_fbx
 from generator.heads.gltf_file import gltf_files
 from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
@@ -17,11 +19,11 @@ from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key
 from generator.heads.ply import ply_textures
 
-SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".vrm", ".fbx", ".stl")
+SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".vrm", ".fbx", ".dae", *usd.SUFFIXES, ".stl")
 """Where one head comes in several formats, the first of these is read."""
 
 UNREAD = {
-    **dict.fromkeys((".dae", ".usd", ".usda", ".usdc", ".usdz", ".blend", ".abc", ".x3d"), "in Blender"),
+    **dict.fromkeys((".blend", ".abc", ".x3d"), "in Blender"),
     **dict.fromkeys((".3ds", ".wrl", ".max", ".ma", ".mb", ".c4d"), "in the program that wrote it"),
 }
 """Other formats of meshes, and where such a file is opened. Some name further files, anywhere: Blender, whose
@@ -187,6 +189,10 @@ def _textures(mesh: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
             return ply_textures(mesh), ()
         case ".gltf":
             return gltf_files(mesh), ()
+        case suffix if suffix in usd.SUFFIXES:
+            usd.check_usd(mesh)  # its images are known once Blender has read it
+        case ".dae":
+            return collada_files(mesh)
         case ".fbx":
             # Blender reads its textures; what they are stands in no unit's name.
             return (), check_fbx(mesh)

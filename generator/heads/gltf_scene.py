@@ -7,7 +7,6 @@ Not through trimesh, which takes skins and morph targets for nothing and sparse 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,29 +14,12 @@ from trimesh.transformations import quaternion_matrix
 
 from generator.errors import HeadError
 from generator.heads.gltf_accessors import Accessors
-from generator.heads.limits import MAX_NODES, MAX_TRIANGLES, MAX_VERTICES, check_count
+from generator.heads.limits import MAX_MOVES, MAX_NODES, MAX_TRIANGLES, MAX_VERTICES, check_count
+from generator.heads.pieces import Piece
 from generator.heads.triangles import of_fan, of_strip
-
-MAX_MOVES = 1 << 28
-"""Vertices times the morph targets and joints that move each."""
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _AT_ONCE = 1 << 18
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A primitive where a node puts it.
-
-    vertices: float64 [V, 3], the scene's frame. triangles: int64 [T, 3], outside counter-clockwise.
-    uv: float32 [V, 2], v up. color: COLOR_0 as stored. material: its number.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    uv: np.ndarray | None
-    color: np.ndarray | None
-    material: int | None
 
 
 def read_pieces(header: dict[str, Any], accessors: Accessors) -> Iterator[Piece]:
@@ -79,11 +61,12 @@ class _Scene:
             raise HeadError(f"a face uses a vertex beyond {len(stored) - 1}; export the mesh again")
         if skin is not None and "JOINTS_0" in attributes:
             # glTF 2.0, 3.7.3.3: only the joints say where a skinned mesh is.
-            vertices = self._skinned(stored, attributes, skin)
+            vertices, mirrored = self._skinned(stored, attributes, skin)
+            inside_out = mirrored[triangles].sum(1) > 1
         else:
             vertices = stored @ world[:3, :3].T + world[:3, 3]
-            if np.linalg.det(world[:3, :3]) < 0:
-                triangles = triangles[:, ::-1]
+            inside_out = np.full(len(triangles), np.linalg.det(world[:3, :3]) < 0)
+        triangles = np.where(inside_out[:, None], triangles[:, ::-1], triangles)
         uv = None
         if "TEXCOORD_0" in attributes:
             uv = np.array(self._accessors.numbers(attributes["TEXCOORD_0"]))
@@ -117,8 +100,10 @@ class _Scene:
                 positions += float(weight) * self._accessors.numbers(target["POSITION"])
         return positions
 
-    def _skinned(self, stored: np.ndarray, attributes: dict[str, Any], skin: int) -> np.ndarray:
-        """Linear blend skinning at the pose that the joints' nodes have."""
+    def _skinned(
+        self, stored: np.ndarray, attributes: dict[str, Any], skin: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Linear blend skinning at the pose that the joints' nodes have; and bool [V], where that mirrors."""
         joints: list[np.ndarray] = []
         weights: list[np.ndarray] = []
         while f"JOINTS_{len(joints)}" in attributes:
@@ -131,13 +116,14 @@ class _Scene:
         total = weight.sum(1, keepdims=True)
         first = np.arange(weight.shape[1]) == 0
         weight = np.where(total > 0, weight / np.where(total > 0, total, 1), first)
-        moved = np.empty_like(stored)
+        moved, mirrored = np.empty_like(stored), np.empty(len(stored), dtype=bool)
         step = max(1, _AT_ONCE // weight.shape[1])
         for start in range(0, len(stored), step):
             part = slice(start, start + step)
             blended = np.einsum("vk,vkij->vij", weight[part], matrices[joint[part]])
             moved[part] = np.einsum("vij,vj->vi", blended[:, :, :3], stored[part]) + blended[:, :, 3]
-        return moved
+            mirrored[part] = np.linalg.det(blended[:, :, :3]) < 0
+        return moved, mirrored
 
     def _skin(self, index: int) -> np.ndarray:
         """float64 [joints, 3, 4]: from the mesh's frame at its bind pose to the scene's."""

@@ -19,6 +19,9 @@ MAX_GEOMETRY_BYTES = 1 << 29
 MAX_VERTICES = MAX_TRIANGLES = 1 << 22
 """Of a scene that says how often each of its meshes is drawn."""
 
+MAX_MOVES = 1 << 28
+"""Vertices times the morph targets and joints that move each."""
+
 MAX_MATERIALS = 1000
 MAX_NODES = 10_000
 MAX_DEPTH = 256

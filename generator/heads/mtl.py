@@ -40,13 +40,19 @@ class MtlMaterial:
     texture goes on beyond 0-1. ambient: the texture is that of map_Ka, as there is no map_Kd."""
 
     color: tuple[float, float, float] | None = None
-    opacity: float = 1.0
+    d: float | None = None
+    transparency: float = 0.0
     texture: str | None = None
     ambient: bool = False
     opacity_map: str | None = None
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     wrap: str = REPEAT
+
+    @property
+    def opacity(self) -> float:
+        """0-1: that of d, else what Tr leaves."""
+        return 1.0 - self.transparency if self.d is None else self.d
 
 
 def decode(data: bytes) -> str:
@@ -161,7 +167,9 @@ def read_mtl(path: Path) -> dict[str, MtlMaterial]:
                 case "kd" if value[:1].isdigit() or value[:1] in ".-+":
                     current.color = _color(value)
                 case "d":
-                    current.opacity = float(value.removeprefix("-halo").strip())
+                    current.d = _number(value.removeprefix("-halo"))
+                case "tr":
+                    current.transparency = _number(value)
                 case "map_kd":
                     current.texture, current.scale, current.offset, current.wrap = _map(value)
                     current.ambient = False
@@ -173,6 +181,13 @@ def read_mtl(path: Path) -> dict[str, MtlMaterial]:
         except ValueError as error:
             raise HeadError(f"line {number} of {path} cannot be read: {quoted(line)}; correct it") from error
     return materials
+
+
+def _number(value: str) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("not finite")
+    return number
 
 
 def _color(value: str) -> tuple[float, float, float]:

@@ -64,28 +64,36 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
         entries = dict.fromkeys(names, MtlMaterial(texture=texture.name))
     else:
         entries, problems = _library(path, names, colored=colors is not None)
-    uv = table[corner_uv] if any(entry.texture for entry in entries.values()) else None
+    mapped = any(entry.texture or entry.opacity_map for entry in entries.values())
+    uv = table[corner_uv] if mapped else None
     textures = Textures()
-    materials, keep = [], np.ones(len(position), dtype=bool)
+    materials, clear, keep = [], [], np.ones(len(position), dtype=bool)
     for index, name in enumerate(names):
         entry, of_material = entries[name], material_index == index
-        if entry.opacity < SEE_THROUGH and not entry.texture:
-            keep &= ~of_material
-            problems.append(f"the see-through material {quoted(name)} is left out")
         material = Material(name or "skin", entry.color or SKIN)
-        if uv is not None and entry.texture:
+        seen = bool(entry.opacity_map) or entry.opacity >= SEE_THROUGH
+        if uv is not None and (entry.texture or entry.opacity_map):
             placed = uv[of_material] * entry.scale + entry.offset
+            if entry.opacity_map:
+                opacity = find_inside(path.parent, entry.opacity_map, "opacity map")
+                used = placed[(corner_uv[of_material] > 0).all(axis=1)]
+                seen = textures.peak_opacity(opacity, used, (entry.wrap, entry.wrap)) >= SEE_THROUGH
             material, uv[of_material] = _textured(path, scratch, textures, index, material, entry, placed)
             if bare := int((corner_uv[of_material] == 0).any(axis=1).sum()):
                 problems.append(
                     f"{bare} triangles of the textured {quoted(name)} have no texture coordinates"
                 )
+        if not seen:
+            keep &= ~of_material
+            clear.append(f"the see-through material {quoted(name)} is left out")
         materials.append(material)
         if entry.ambient:
             problems.append(f"the material {quoted(name)} has its texture as map_Ka alone; drawn with it")
-        if entry.color is None and not entry.texture and colors is None:
+        if entry.color is None and not material.texture and colors is None:
             problems.append(f"no texture or colour for the material {quoted(name)}; drawn as plain skin")
-    if not keep.any():
+    if keep.any():
+        problems += clear
+    else:  # d or Tr written the other way round
         keep[:] = True
     textured = [m.texture is not None for m in materials]
     return HeadMesh(
@@ -149,19 +157,23 @@ def _textured(
     entry: MtlMaterial,
     uv: np.ndarray,
 ) -> tuple[Material, np.ndarray]:
-    """A material with its texture, and its coordinates, float64 [T, 3, 2], brought back into that."""
-    assert entry.texture is not None, "asked for materials with a texture alone"
-    texture = find_inside(path.parent, entry.texture, "texture")
-    textures.check(texture)
+    """A material with its texture, or plain with cut-outs, and its coordinates, float64 [T, 3, 2], brought
+    back into that."""
     wraps = (entry.wrap, entry.wrap)
+    color: Path | tuple[float, float, float] = material.base_color
+    if entry.texture:
+        color = find_inside(path.parent, entry.texture, "texture")
+        textures.check(color)
     if entry.opacity_map and entry.opacity_map != entry.texture:
         opacity = find_inside(path.parent, entry.opacity_map, "opacity map")
         combined = scratch / f"{path.stem}-cutout{index}.png"
-        combine_alpha(texture, opacity, combined)
+        combine_alpha(color, opacity, combined)
         laid, moved, _ = textures.lay(replace(material, texture=combined), uv, wraps)
         if laid.cutout:
             return laid, moved
-    laid, moved, _ = textures.lay(replace(material, texture=texture), uv, wraps)
+    if isinstance(color, tuple):
+        return material, uv
+    laid, moved, _ = textures.lay(replace(material, texture=color), uv, wraps)
     return laid, moved
 
 

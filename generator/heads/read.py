@@ -8,6 +8,8 @@ from pathlib import Path
 
 from generator.errors import HeadError
 from generator.escape import printable
+from generator.heads import usd
+from generator.heads.collada import read_collada
 from generator.heads.eyeballs import add_eyeballs
 from generator.heads.fbx import check_fbx
 from generator.heads.gltf import read_gltf
@@ -34,7 +36,7 @@ def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlend
     ----------
     scratch: an existing folder of this head alone; textures that the mesh
         embeds or that are made for it are written there.
-    import_with_blender: converts FBX and Draco; None where no Blender can be run.
+    import_with_blender: converts FBX, USD and Draco; None where no Blender can be run.
 
     Raises
     ------
@@ -69,6 +71,10 @@ def _read(path: Path, scratch: Path, import_with_blender: ImportWithBlender | No
             if missing := check_fbx(path):
                 raise HeadError(missing[0])
             return read_gltf(import_with_blender(path, scratch), scratch)
+        case ".dae":
+            return read_collada(path, scratch)
+        case suffix if suffix in usd.SUFFIXES:
+            return usd.read_usd(path, scratch, import_with_blender)
         case ".stl":
             return read_stl(path)
-    raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB or FBX")
+    raise HeadError("not a mesh format that can be read; use OBJ, PLY, GLB, FBX, DAE or USD")

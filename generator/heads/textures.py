@@ -170,6 +170,13 @@ class Textures:
             return 1.0
         return float(_samples(alpha, *bring_back(uv, wraps)).max()) / 255
 
+    def peak_opacity(self, path: Path, uv: np.ndarray, wraps: tuple[str, str]) -> float:
+        """The most, 0-1, that an opacity map is where triangles use it."""
+        self.check(path)
+        with open_image(path) as image:
+            mask = np.asarray(_mask(image))
+        return float(_samples(mask, *bring_back(uv, wraps)).max()) / 255 if len(uv) else 1.0
+
     def mean_red(self, path: Path, uv: np.ndarray, wraps: tuple[str, str]) -> float:
         """How red, 0-1, an image is where triangles use it."""
         self.check(path)
@@ -269,11 +276,20 @@ def _samples(channel: np.ndarray, uv: np.ndarray, wrap: str) -> np.ndarray:
     return channel[texels(points, wrap, channel.shape)]
 
 
-def combine_alpha(color: Path, opacity: Path, target: Path) -> None:
-    """Write ``color`` with ``opacity`` (its alpha, else its brightness) as alpha channel, a PNG."""
+def combine_alpha(color: Path | tuple[float, float, float], opacity: Path, target: Path) -> None:
+    """Write ``color``, an image or sRGB 0-1, with ``opacity`` (its alpha, else its brightness) as alpha
+    channel, a PNG."""
     with open_image(opacity) as image:
-        mask = image.convert("RGBA").getchannel("A") if image.has_transparency_data else image.convert("L")
-    with open_image(color) as image:
-        combined = image.convert("RGB")
+        mask = _mask(image)
+    if isinstance(color, tuple):
+        red, green, blue = (round(255 * value) for value in color)
+        combined = Image.new("RGB", mask.size, (red, green, blue))
+    else:
+        with open_image(color) as image:
+            combined = image.convert("RGB")
     combined.putalpha(mask.resize(combined.size))
     combined.save(target, compress_level=1)
+
+
+def _mask(image: Image.Image) -> Image.Image:
+    return image.convert("RGBA").getchannel("A") if image.has_transparency_data else image.convert("L")

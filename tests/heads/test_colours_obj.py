@@ -171,3 +171,70 @@ def test_a_texture_goes_on_beyond_its_border(
     expected = np.array([0.1 + u, 0.1 + v] if moved else [0.1 + u % 1, 0.1])
     np.testing.assert_allclose(mesh.uv.min((0, 1)), expected, atol=1e-6)
     assert TEXTURED_FACES in path.read_text()
+
+
+SHELL = f"mtllib head.mtl\n{TETRAHEDRON}{UV}usemtl skin\nf 1/1 3/2 2/3\nf 1/1 2/2 4/3\n"
+SHELL += "usemtl cornea\nf 1/1 4/2 3/3\n"
+
+
+def _opacity(path: Path, value: int, hole: int | None = None) -> None:
+    """16 x 16 pixels; the triangles use the lower left, of which a part is the hole."""
+    image = Image.new("L", (16, 16), value)
+    if hole is not None:
+        image.paste(hole, (2, 10, 5, 15))
+    image.save(path)
+
+
+@pytest.mark.parametrize(
+    ("cornea", "drawn"),
+    [
+        ("d 0.1", False),
+        ("d 0.1\nmap_Kd skin.png", False),
+        ("Tr 0.9", False),
+        ("Tr 0.9\nmap_Kd skin.png", False),
+        ("map_d clear.png", False),
+        ("map_Kd skin.png\nmap_d clear.png", False),
+        ("map_d clear_in_alpha.png", False),
+        ("d 0.1\nmap_d solid.png\nmap_Kd skin.png", True),
+        ("Tr 1\nd 1", True),  # of the two d is meant
+        ("d 0.6", True),
+        ("Tr 0.4", True),
+        ("map_d solid.png", True),
+        ("map_Kd skin.png\nmap_d holes.png", True),
+        ("Kd 0.2 0.4 0.6\nmap_d holes.png", True),
+    ],
+)
+def test_shells_that_one_looks_through_are_left_out(tmp_path: Path, cornea: str, drawn: bool) -> None:
+    Image.new("RGB", (8, 8), (200, 150, 130)).save(tmp_path / "skin.png")
+    _opacity(tmp_path / "clear.png", 20)
+    _opacity(tmp_path / "solid.png", 255)
+    _opacity(tmp_path / "holes.png", 255, 0)
+    Image.new("RGBA", (8, 8), (255, 255, 255, 20)).save(tmp_path / "clear_in_alpha.png")
+    (tmp_path / "head.obj").write_text(SHELL)
+    (tmp_path / "head.mtl").write_text(f"newmtl skin\nKd 1 1 1\nnewmtl cornea\nKd 1 1 1\n{cornea}\n")
+    mesh, notes = read(tmp_path / "head.obj")
+    assert len(mesh.triangles) == 2 + drawn
+    assert ("the see-through material 'cornea' is left out" in notes) is not drawn
+    if "holes" in cornea:
+        assert mesh.materials[1].cutout and mesh.materials[1].texture is not None
+    if cornea.startswith("Kd"):
+        with Image.open(mesh.materials[1].texture) as image:  # type: ignore[arg-type]
+            assert image.convert("RGBA").getpixel((15, 0)) == (51, 102, 153, 255)
+            assert image.convert("RGBA").getpixel((3, 12))[3] == 0  # type: ignore[index]
+
+
+@pytest.mark.parametrize("opacity", ["d 0", "Tr 1", "Tr 0.8"])
+def test_a_head_of_nothing_but_shells_is_written_the_other_way_round(tmp_path: Path, opacity: str) -> None:
+    (tmp_path / "head.obj").write_text(SHELL)
+    materials = (f"newmtl {name}\nKd 1 1 1\n{opacity}\n" for name in ("skin", "cornea"))
+    (tmp_path / "head.mtl").write_text("".join(materials))
+    mesh, notes = read(tmp_path / "head.obj")
+    assert len(mesh.triangles) == 3
+    assert not any("see-through" in note for note in notes)
+
+
+def test_an_opacity_map_without_texture_coordinates_hides_nothing(tmp_path: Path) -> None:
+    _opacity(tmp_path / "clear.png", 255, 0)
+    (tmp_path / "head.obj").write_text(f"mtllib head.mtl\n{TETRAHEDRON}usemtl skin\n{FACES}")
+    (tmp_path / "head.mtl").write_text("newmtl skin\nKd 1 1 1\nmap_d clear.png\n")
+    assert len(read(tmp_path / "head.obj")[0].triangles) == 4

@@ -51,7 +51,7 @@ def test_vrm_is_a_glb(tmp_path: Path) -> None:
     assert len(read(tmp_path / "head.vrm", tmp_path / "scratch").triangles) == 80
 
 
-@pytest.mark.parametrize("name", ["anna.dae", "anna.USDZ", "anna.blend", "anna.3ds"])
+@pytest.mark.parametrize("name", ["anna.x3d", "anna.ABC", "anna.blend", "anna.3ds"])
 def test_what_is_not_read_is_skipped_with_the_way_out(tmp_path: Path, name: str) -> None:
     plain_obj(tmp_path / "good.obj")
     (tmp_path / name).write_bytes(b"x")
@@ -67,7 +67,7 @@ def test_what_is_not_read_is_skipped_with_the_way_out(tmp_path: Path, name: str)
 
 def test_a_head_that_comes_in_a_format_that_is_read_too_is_not_skipped(tmp_path: Path) -> None:
     plain_obj(tmp_path / "anna.obj")
-    shutil.copy(tmp_path / "anna.obj", tmp_path / "anna.dae")
+    shutil.copy(tmp_path / "anna.obj", tmp_path / "anna.blend")
     source = find_heads(tmp_path)
     assert (len(source.heads), source.skipped) == (1, ())
 

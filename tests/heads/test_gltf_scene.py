@@ -47,6 +47,26 @@ def test_skin_and_rigid_eye_under_a_posed_joint_stay_together(tmp_path: Path) ->
     np.testing.assert_allclose(one, [[-2, 0, 3], [2, 0, 3], [2, 0, 7]], atol=1e-12)
 
 
+@pytest.mark.parametrize("skinned", [True, False])
+def test_what_is_mirrored_keeps_its_outside(tmp_path: Path, skinned: bool) -> None:
+    """Rigs mirror one side of a body by a negative scale: a triangle that faces +Z goes on facing +Z."""
+    gltf = SmallGltf()
+    gltf.header |= {"textures": [{"source": 0}], "images": [{"uri": image_uri((200, 100, 50))}]}
+    gltf.header["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    mirrored = gltf.node(scale=[-1, 1, 1])
+    gltf.header["skins"] = [{"joints": [mirrored]}]
+    if skinned:
+        gltf.node(mesh=gltf.triangle(gltf.bound([0, 0, 0, 0], [1, 0, 0, 0]), material=0), skin=0)
+    else:
+        gltf.header["nodes"][mirrored]["mesh"] = gltf.triangle(material=0)
+    mesh = read(gltf, tmp_path)
+    (triangle,) = corners(mesh)
+    assert np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])[2] > 0
+    # Each corner keeps its texture coordinate: u went from left to right, and now goes back.
+    assert mesh.uv is not None
+    np.testing.assert_allclose(mesh.uv[0][:, 0], (1 - triangle[:, 0]) / 2)
+
+
 @pytest.mark.parametrize("total", [1.0, 0.5])
 def test_joints_are_blended_from_their_bind_pose(tmp_path: Path, total: float) -> None:
     # Two joints that were bound at z = 1 and stand at z = 3 and z = 5: half of each is a move by 3.

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from generator.errors import HeadError, UsageError
+from generator.errors import HeadError, UsageError, WorkerError
 from generator.execution.lanes.lines import LineProcess
 from generator.execution.lanes.options import DEADLINE_S
 from generator.execution.lanes.scratch import scratch_folder
@@ -135,7 +135,10 @@ class Renderer:
                 pass
 
     def import_mesh(self, source: Path, folder: Path) -> Path:
-        """Have Blender read a mesh file and write it into folder as GLB, whose path is returned."""
+        """Have Blender read a mesh file and write it into folder as GLB, whose path is returned.
+
+        A JSON beside it says which image of a file each of those stands for that stand for one.
+        """
         target = folder / f"{source.stem}.glb"
         self._send(ConvertOrder(str(source), str(target)))
         for _ in self._receipts():
@@ -176,6 +179,12 @@ def mesh_importer(blender: str | None = None) -> Iterator[Callable[[Path, Path],
                 scratch = stack.enter_context(scratch_folder())
                 worker = Renderer(scratch, scratch / "render.log", blender=blender)
                 stack.callback(worker.close)
-            return worker.import_mesh(source, folder)
+            try:
+                return worker.import_mesh(source, folder)
+            except WorkerError as error:
+                # A file that its importer does not survive is that head's; others get another worker.
+                stack.pop_all().close()
+                worker = None
+                raise HeadError(f"Blender ended while it read the file ({error})") from error
 
         yield import_mesh
