@@ -24,7 +24,7 @@ from generator.placing.known import anchors_on, find_known, level_known, stand_k
 from generator.placing.levelling import Levelling
 from generator.placing.looking import Eyes
 from generator.placing.rendering import HeadRenderer
-from generator.placing.sharing import OwnAnchors, share
+from generator.placing.sharing import FEWEST, OwnAnchors, same_topology, share
 
 
 class Placer:
@@ -102,22 +102,22 @@ class Placer:
         axes, and those whose anchors are shared already, take no part. Raises HeadError if one cannot be
         read any more.
         """
-        topologies: dict[tuple[int, bytes], list[int]] = {}
-        for number, (head, found) in enumerate(zip(heads, placed, strict=True)):
-            anchors = found.facts[0].anchors
-            if (
-                anchors is None
-                or anchors.way != "head"
-                or not anchors.views
-                or any(found.placement.turned_deg)
-            ):
-                continue
-            triangles = self._read(head).triangles
-            topologies.setdefault((len(triangles), triangles.tobytes()), []).append(number)
+        alone = [
+            number
+            for number, found in enumerate(placed)
+            if (anchors := found.facts[0].anchors) is not None
+            and (anchors.views and anchors.way == "head" and not any(found.placement.turned_deg))
+        ]
+        meshes = [self._read(heads[number]).triangles for number in alone]
         return tuple(
-            share(self._own(heads, placed, numbers), self._topology, count=count, way="source")
-            for (count, _), numbers in topologies.items()
-            if len(numbers) > 1
+            share(
+                self._own(heads, placed, [alone[k] for k in members]),
+                self._topology,
+                count=count,
+                way="source",
+            )
+            for count, members in same_topology(meshes)
+            if len(members) >= FEWEST
         )
 
     def _own(

@@ -8,7 +8,7 @@ there: from then on they mean the same place on every head and every expression.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,6 +87,24 @@ def share(heads: Iterable[OwnAnchors], topology: Topology, *, count: int, way: s
         correction=tuple(np.round(zero.correction, 9).reshape(-1).tolist()),
         correction_sd_deg=tuple(np.round(zero.sd_deg, 3).tolist()),
     )
+
+
+def same_topology(meshes: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
+    """Which meshes have the same triangles, int [T, 3] each: how many those are, and the meshes' places.
+
+    One that has more behind them, such as long hair, is among them, unless that is most of it.
+    """
+    groups: list[tuple[np.ndarray, list[int]]] = []
+    for place in sorted(range(len(meshes)), key=lambda place: len(meshes[place])):
+        triangles = meshes[place]
+        for first, members in groups:
+            count = len(first)
+            if 2 * count >= len(triangles) and np.array_equal(triangles[:count], first):
+                members.append(place)
+                break
+        else:
+            groups.append((triangles, [place]))
+    return [(len(first), sorted(members)) for first, members in groups]
 
 
 def _places(surface: Surface, anchors: Anchors) -> np.ndarray:

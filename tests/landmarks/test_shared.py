@@ -35,7 +35,7 @@ from generator.landmarks.surface import Surface
 from generator.landmarks.topology import FACE_MESH
 from generator.placing.anchors import anchors_at
 from generator.placing.known import anchors_on, find_known, stand_known
-from generator.placing.sharing import OwnAnchors, share
+from generator.placing.sharing import OwnAnchors, same_topology, share
 
 CANONICAL_FACE = Path(__file__).resolve().parents[3] / "shared" / "real_faces" / "canonical_face.csv"
 HEAD = Head("amy", "neutral", "mesh", Path("amy.obj"), (Path("amy.obj"),))
@@ -109,6 +109,15 @@ def test_heads_of_another_topology_share_nothing() -> None:
         share([found_on(mesh, 1.0), found_on(turned, 1.0)], FACE_MESH, count=count, way="source")
     with pytest.raises(HeadError, match="1 heads: anchors are shared by 2 or more"):
         share([found_on(mesh, 1.0)], FACE_MESH, count=count, way="source")
+
+
+def test_topologies_are_told_apart_by_their_triangles_and_hair_behind_them_is_none() -> None:
+    bald = face_mesh().triangles
+    long_hair = np.concatenate([bald, bald[:50] + 1])
+    other = bald[::-1]
+    mostly_hair = np.concatenate([bald, bald + 1, bald + 2])
+    found = same_topology([long_hair, other, bald, long_hair, mostly_hair])
+    assert found == [(len(bald), [1]), (len(bald), [0, 2, 3]), (len(mostly_hair), [4])]
 
 
 def test_a_mesh_is_known_by_its_triangles_and_by_its_face(shared: SharedAnchors) -> None:
