@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree
 
 from generator.heads.parametric.atlas import head_atlas, vertex_normals
 from generator.heads.parametric.eyes import fit_eyeball
+from generator.heads.parametric.folder import head_triangles
 from generator.heads.parametric.identity import (
     apply_targets,
     base_vertices,
@@ -36,6 +37,7 @@ from generator.heads.parametric.noise import smoothstep
 from generator.heads.parametric.real_shape import PREFIX, write_real_shape
 from generator.heads.parametric.source import base_mesh
 from generator.heads.parametric.template import PARTS, head_template, neck_height
+from generator.landmarks.shared import packaged
 from generator.landmarks.topology import FACE_MESH
 
 MODES = 12
@@ -69,7 +71,7 @@ LINING_DM = 0.06
 """How widely the edges of lips and lids are averaged for what lies behind them."""
 
 FINE_DM, FINE_SHARE = 0.25, 0.02
-NOISE, MEAN_NOISE = 0.03, 0.01
+NOISE, MEAN_NOISE = 0.03, 0.006
 """How far a point may be off, as a share of the size of the correction: detections slip along cheeks."""
 
 
@@ -97,14 +99,18 @@ def normalised(points: np.ndarray) -> np.ndarray:
     return centred / np.sqrt((centred**2).sum(-1).mean(-1))[..., None, None]
 
 
-def landmark_places(path: Path) -> csr_matrix:
-    """Where the 468 points lie on a head, as weights of its source vertices, sparse [468, S]."""
+def landmark_places() -> csr_matrix:
+    """Where the 468 points lie on every head, as weights of its source vertices, sparse [468, S]."""
     template = head_template()
-    with np.load(path, allow_pickle=False) as stored:
-        triangles, weights = stored["triangles"], stored["weights"]
-    rows = np.repeat(np.arange(len(triangles)), 3)
-    corners = template.triangles[triangles].ravel()
-    places = csr_matrix((weights.ravel(), (rows, corners)), shape=(len(triangles), len(template.canonical)))
+    [shared] = packaged(FACE_MESH)
+    triangles, _, materials = head_triangles(long_hair=False)
+    as_written = np.concatenate([np.flatnonzero(materials == name) for name in ("skin", "eye", "lash")])
+    corners = triangles[as_written[shared.anchors.triangles]]
+    if corners.max() >= len(template.canonical):
+        raise SystemExit("a point lies on an eyeball: run scripts/make_anchors.py again")
+    rows = np.repeat(np.arange(len(corners)), 3)
+    shape = (len(corners), len(template.canonical))
+    places = csr_matrix((shared.anchors.weights.ravel(), (rows, corners.ravel())), shape=shape)
     return csr_matrix(places @ template.refine)
 
 
@@ -275,7 +281,7 @@ def fit(figures: Figures, places: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
     size = (centred * figures.mean).sum() / (figures.mean**2).sum()
     for_mean, for_modes = Fields(head, places, MEAN_NOISE), Fields(head, places, NOISE)
     correction = np.zeros_like(head)
-    for _ in range(4):
+    for _ in range(6):
         corrected = normalised(np.einsum("ps,nsd->npd", places.toarray(), heads + correction))
         correction = correction + field(for_mean, size * (figures.mean - corrected.mean(0)))
     corrected = normalised(np.einsum("ps,nsd->npd", places.toarray(), heads + correction))
@@ -299,10 +305,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("figures", type=Path)
-    parser.add_argument("--anchors", type=Path, required=True)
     parser.add_argument("--check", action="store_true", help="only print")
     given = parser.parse_args()
-    figures, places = read_figures(given.figures), landmark_places(given.anchors)
+    figures, places = read_figures(given.figures), landmark_places()
 
     def figures_now(title: str) -> None:
         report(title, np.einsum("ps,nsd->npd", places.toarray(), sampled()), figures)
