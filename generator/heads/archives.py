@@ -19,7 +19,15 @@ MAX_MEMBERS = 10_000
 _ENCRYPTED = 1
 _DEEPEST = 8
 _PIECE = 1 << 20
-_BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, NotImplementedError)
+_BROKEN = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    ValueError,
+    LookupError,
+    NotImplementedError,
+)
 
 
 def unpack_stored(path: Path, folder: Path, wanted: Callable[[str], bool]) -> list[Path]:
@@ -63,6 +71,8 @@ def _parts(entry: zipfile.ZipInfo) -> list[str]:
         raise HeadError(f"{quoted(entry.filename)} is a link in the archive; pack the file itself")
     if entry.flag_bits & _ENCRYPTED:
         raise HeadError("an archive that is encrypted; pack it without")
+    if entry.header_offset < 0:
+        raise HeadError(f"{quoted(entry.filename)} lies before the archive; pack it again")
     if entry.compress_type != zipfile.ZIP_STORED:
         raise HeadError(f"{quoted(entry.filename)} is compressed, as nothing in such an archive may be")
     return parts

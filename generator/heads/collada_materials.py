@@ -77,6 +77,7 @@ def read_material(document: Document, material: Element) -> ColladaMaterial:
     texture, mask = picture(colored), picture(transparent)
     opaque = "A_ONE" if transparent is None else transparent.get("opaque", "A_ONE")
     unread = mask is not None and opaque.endswith("ZERO")
+    emissive = shader.find("emission/texture") is not None and texture is None
     same = mask is not None and texture is not None and mask.name == texture.name
     plain = numbers(None if colored is None else colored.find("color"))
     return ColladaMaterial(
@@ -86,8 +87,14 @@ def read_material(document: Document, material: Element) -> ColladaMaterial:
         opacity=1.0 if mask else _opacity(shader, transparent, opaque),
         opacity_map=None if unread or same else mask,
         same_map=same and not unread,
-        note=f"the map of transparency of {quoted(name)} is not drawn" if unread else "",
+        note=_note(name, unread=unread, emissive=emissive),
     )
+
+
+def _note(name: str, *, unread: bool, emissive: bool) -> str:
+    if unread:
+        return f"the map of transparency of {quoted(name)} is not drawn"
+    return f"the emissive texture of {quoted(name)} is not drawn" if emissive else ""
 
 
 def _needed(element: Element | None) -> Element:

@@ -29,6 +29,9 @@ UNREAD = {
 """Other formats of meshes, and where such a file is opened. Some name further files, anywhere: Blender, whose
 importers could read them, would open what they name."""
 
+ARCHIVES = (".zip", ".7z", ".rar", ".gz", ".tgz", ".tar")
+"""Which heads have to be unpacked from: what is hashed, placed and rendered again are files."""
+
 MAX_DEPTH = 3
 
 
@@ -101,7 +104,16 @@ def find_meshes(path: Path) -> tuple[list[Head], list[SkippedHead]]:
                 found.add(stem, NEUTRAL, folder / name, plain)
             else:
                 found.add(subject, stem, folder / name, plain)
+        for name in sorted(names, key=natural_key):
+            # One that was unpacked lies beside its files.
+            if Path(name).suffix.lower() in ARCHIVES and not _is_unpacked(folder, Path(name).stem, stems):
+                found.skip(Path(name).stem, NEUTRAL, folder / name, f"{name} is an archive; unpack it here")
     return list(found.heads.values()), found.skipped
+
+
+def _is_unpacked(folder: Path, stem: str, stems: set[str]) -> bool:
+    plain = stem.removesuffix(".tar")
+    return plain in stems or Path(plain).stem in stems or (folder / plain).is_dir()
 
 
 def _unread(name: str) -> str:

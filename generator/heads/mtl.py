@@ -37,7 +37,8 @@ _OPTION_VALUES = {**dict.fromkeys(_ONE_VALUE, 1), "-mm": 2}
 @dataclass
 class MtlMaterial:
     """One ``newmtl``. Maps are names as written; scale and offset act on (u, v), and wrap is how the
-    texture goes on beyond 0-1. ambient: the texture is that of map_Ka, as there is no map_Kd."""
+    texture goes on beyond 0-1. ambient: the texture is that of map_Ka, as there is no map_Kd.
+    transparency: Tr, which says the reverse of d. emissive: it has a map_Ke."""
 
     color: tuple[float, float, float] | None = None
     d: float | None = None
@@ -45,6 +46,7 @@ class MtlMaterial:
     texture: str | None = None
     ambient: bool = False
     opacity_map: str | None = None
+    emissive: bool = False
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     wrap: str = REPEAT
@@ -176,6 +178,8 @@ def read_mtl(path: Path) -> dict[str, MtlMaterial]:
                 case "map_ka" if value and (current.ambient or not current.texture):
                     current.texture, current.scale, current.offset, current.wrap = _map(value)
                     current.ambient = True
+                case "map_ke" if value:
+                    current.emissive = True
                 case "map_d":
                     current.opacity_map = _map(value)[0]
         except ValueError as error:

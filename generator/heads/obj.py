@@ -65,7 +65,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
     else:
         entries, problems = _library(path, names, colored=colors is not None)
     mapped = any(entry.texture or entry.opacity_map for entry in entries.values())
-    uv = table[corner_uv] if mapped else None
+    uv = table.astype(np.float32)[corner_uv] if mapped else None
     textures = Textures()
     materials, clear, keep = [], [], np.ones(len(position), dtype=bool)
     for index, name in enumerate(names):
@@ -73,7 +73,9 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
         material = Material(name or "skin", entry.color or SKIN)
         seen = bool(entry.opacity_map) or entry.opacity >= SEE_THROUGH
         if uv is not None and (entry.texture or entry.opacity_map):
-            placed = uv[of_material] * entry.scale + entry.offset
+            placed = table[corner_uv[of_material]]
+            placed *= entry.scale  # in place: of a scan of millions each copy counts
+            placed += entry.offset
             if entry.opacity_map:
                 opacity = find_inside(path.parent, entry.opacity_map, "opacity map")
                 used = placed[(corner_uv[of_material] > 0).all(axis=1)]
@@ -89,6 +91,8 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
         materials.append(material)
         if entry.ambient:
             problems.append(f"the material {quoted(name)} has its texture as map_Ka alone; drawn with it")
+        if entry.emissive and not entry.texture:
+            problems.append(f"the emissive texture of {quoted(name)} is not drawn")
         if entry.color is None and not material.texture and colors is None:
             problems.append(f"no texture or colour for the material {quoted(name)}; drawn as plain skin")
     if keep.any():
@@ -99,7 +103,7 @@ def read_obj(path: Path, scratch: Path, texture: Path | None = None) -> HeadMesh
     return HeadMesh(
         vertices=vertices,
         triangles=position[keep] - 1,
-        uv=None if uv is None else uv[keep].astype(np.float32),
+        uv=None if uv is None else uv[keep],
         vertex_colors=None if all(textured) else colors,
         material_index=material_index[keep],
         materials=tuple(materials),

@@ -12,12 +12,10 @@ from generator import registries
 from generator.errors import HeadError, UsageError
 from generator.escape import quoted
 from generator.heads.facescape import EXPRESSIONS, expression_number
-from generator.heads.folders import SUFFIXES, UNKNOWN_LICENSE
+from generator.heads.folders import ARCHIVES, SUFFIXES, UNKNOWN_LICENSE
 from generator.heads.head import Finder, Head, HeadSource, SkippedHead
 from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
 from generator.names import is_text
-
-_ARCHIVES = (".zip", ".7z", ".rar", ".gz", ".tgz", ".tar")
 
 
 def find_heads(
@@ -140,11 +138,13 @@ def _search(path: Path) -> tuple[str, Finder, list[Head], list[SkippedHead]]:
 
 
 def _nothing_found(path: Path) -> str:
-    if path.suffix.lower() in _ARCHIVES and path.is_file():
+    if path.suffix.lower() in ARCHIVES and path.is_file():
         return f"{path} is an archive: unpack it, and name the folder"
-    archives = sorted(path.glob("*.zip")) if path.is_dir() else []
-    if archives:
-        return f"no heads in {path}, but {archives[0].name}: unzip it first"
+    # Downloads hold them a folder or two down.
+    below = (entry for depth in ("*", "*/*", "*/*/*") for entry in sorted(path.glob(depth)))
+    archive = next((entry for entry in below if entry.suffix.lower() in ARCHIVES and entry.is_file()), None)
+    if archive is not None:
+        return f"no heads in {path}, but the archive {archive.relative_to(path)}: unpack it first"
     return f"no heads in {path}; expected {', '.join(SUFFIXES)} files or FaceScape's numbered folders"
 
 

@@ -26,8 +26,9 @@ def bring_back(uv: np.ndarray, wraps: tuple[str, str]) -> tuple[np.ndarray, str]
 
     Returns
     -------
-    uv: float64 [T, 3, 2]. wrap: how the texture goes on for what still lies beyond it, EXTEND if nothing
-    does. Of two ways along u and v that are both needed it is that along u; see :func:`needs_both`.
+    uv: float64 [T, 3, 2], what was given where all of it lies in the image. wrap: how the texture goes on
+    for what still lies beyond it, EXTEND if nothing does. Of two ways along u and v that are both needed it
+    is that along u; see :func:`needs_both`.
 
     Raises
     ------
@@ -35,7 +36,10 @@ def bring_back(uv: np.ndarray, wraps: tuple[str, str]) -> tuple[np.ndarray, str]
     """
     if not np.isfinite(uv).all():
         raise HeadError("a texture coordinate is not a finite number; export the mesh again")
-    uv = np.array(uv, dtype=np.float64)
+    uv = np.asarray(uv, dtype=np.float64)
+    if uv.min(initial=0) >= -ROUNDING and uv.max(initial=0) <= 1 + ROUNDING:
+        return uv, EXTEND
+    uv = uv.copy()
     needed = [_bring_back(uv[..., axis], wrap) for axis, wrap in enumerate(wraps)]
     return uv, next((wrap for wrap, need in zip(wraps, needed, strict=True) if need), EXTEND)
 

@@ -20,11 +20,14 @@ shown = bpy.context.scene.headturn
 shown.heads_count, shown.render_resolution, shown.workers, shown.out = 1, 64, 1, str(out)
 shown.poses_yaw = shown.poses_pitch = (-40, 40, 1)
 session.with_host(lambda: building.start(bpy.context.scene))
+FIRST_PART = 100
+"""Images of a part: when there are more, it was committed."""
+
 marked = False
 while build.exit_code is None:
     session.tick()
     building.poll()
-    if build.runs and build.progress.stage == "rendering" and build.progress.done > 0 and not marked:
+    if build.runs and build.progress.stage == "rendering" and build.progress.done > FIRST_PART and not marked:
         marked = True
         pids = {"blender": os.getpid(), "host": build.process.pid}
         out.with_suffix(".json").write_text(json.dumps(pids), encoding="utf-8")

@@ -30,16 +30,17 @@ def test_a_dataset_grows_and_replays(tmp_path: Path, monkeypatch: pytest.MonkeyP
     write_light(tmp_path / "project" / "kit")
     monkeypatch.chdir(tmp_path / "project")
     source = "ict:kit"
-    one = run(config_for(source, heads={"count": 1}), tmp_path / "d")
-    assert one.complete and one.manifest.heads == 1
+    two = run(config_for(source, heads={"count": 2}), tmp_path / "d")
+    assert two.complete and two.manifest.heads == 2
     text = (tmp_path / "d" / "config.toml").read_text()
     assert 'source = "ict:../project/kit"' in text
     monkeypatch.chdir(tmp_path)
-    recorded = load_config(tmp_path / "d" / "config.toml", {"heads": {"count": 2}})
-    two = run(recorded, tmp_path / "d")
-    assert two.manifest.heads == 2 and verify_dataset(tmp_path / "d").ok
+    recorded = load_config(tmp_path / "d" / "config.toml", {"heads": {"count": 3}})
+    three = run(recorded, tmp_path / "d")
+    assert three.manifest.heads == 3 and verify_dataset(tmp_path / "d").ok
     rows = read_heads(tmp_path / "d")
-    assert [row.subject for row in rows] == ["ict-s0p0000", "ict-s0p0001"]
+    assert [row.subject for row in rows] == ["ict-s0p0000", "ict-s0p0001", "ict-s0p0002"]
+    assert {row.anchor_way for row in rows} == {"source"}, "one list of triangles, so one set of anchors"
     assert {row.license for row in rows} == {"MIT"} and all(row.redistributable for row in rows)
     os.rename(tmp_path / "project", tmp_path / "gone")
     sample = f"{rows[0].subject}/neutral/y-40_p+0_r+0"

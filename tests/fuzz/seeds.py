@@ -22,6 +22,7 @@ sys.path[:0] = [
     str(HERE),
     str(HERE.parent / "dataset"),
     str(HERE.parent / "downstream_hpe"),
+    str(HERE.parent / "heads"),
     str(HERE.parents[1]),
 ]
 
@@ -146,6 +147,16 @@ def head_seeds() -> Iterator[tuple[str, bytes]]:
     facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     yield "stl", f"solid head\n{facet}endsolid head\n".encode()
     yield "stl", bytes(80) + struct.pack("<I12fH", 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    from small_collada import SHOWN, TEXTURED, collada
+    from small_usd import mesh, stage, usdz
+
+    yield "collada", collada().encode()
+    inner = f"<node><matrix>{'1 0 0 0 0 ' * 3}1</matrix>{SHOWN}</node>"
+    nested = f'<node id="n"><rotate>1 0 0 90</rotate>{inner}</node>'
+    yield "collada", collada(shader=TEXTURED, nodes=nested, asset='<unit meter="0.01"/>').encode()
+    with tempfile.TemporaryDirectory() as folder:
+        layer = stage(mesh()).encode()
+        yield "package", usdz(Path(folder) / "a.usdz", {"a.usda": layer, "b/c.png": b"x"}).read_bytes()
     yield (
         "facescape",
         b"1_neutral.obj\n1_neutral.jpg\n2_smile.obj\n2_smile.obj.mtl\0newmtl a\nmap_Kd 1_neutral.jpg\n",

@@ -393,6 +393,27 @@ def stl(data: bytes) -> None:
     _read_heads(folder_with(head__stl=data))
 
 
+@target(
+    weight=2,
+    words="<source> <float_array> <accessor <triangles> <polylist> <vcount> <p> <input offset= semantic= #g "
+    "<skin> <morph> <node> <instance_node url= <matrix> <transparent opaque= <init_from> <!DOCTYPE",
+)
+def collada(data: bytes) -> None:
+    """Collada."""
+    _read_heads(folder_with(head__dae=data, skin__png=sound("texture")))
+
+
+@target(words="PK\x01\x02 PK\x03\x04 PK\x05\x06 .usda .png ../ /")
+def package(data: bytes) -> None:
+    """The archive that a package of USD is."""
+    from generator.heads.archives import unpack_stored
+
+    folder = folder_with(head__usdz=data, package___x="")
+    (folder / "package" / "x").unlink()
+    for file in unpack_stored(folder / "head.usdz", folder / "package", lambda name: True):
+        assert file.resolve().is_relative_to((folder / "package").resolve())
+
+
 @target(words="1_neutral.obj 2_smile.obj 1_neutral.jpg 1_neutral.obj.mtl .obj ..")
 def facescape(data: bytes) -> None:
     """What lies in the folder of a FaceScape subject: a line a file name, and what is in the files."""

@@ -310,6 +310,16 @@ def test_morphs_at_their_default_weights(tmp_path: Path, method: str, moved: lis
     np.testing.assert_allclose(corners(mesh)[0], expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("drawn", [True, False])
+def test_a_texture_that_shines_is_drawn_where_nothing_else_is_or_noted(tmp_path: Path, drawn: bool) -> None:
+    """Of scans whose light is in the texture."""
+    emission = '<emission><texture texture="s" texcoord="UV"/></emission>'
+    shader = f"<constant>{emission}</constant>" if drawn else PLAIN.replace("<phong>", f"<phong>{emission}")
+    mesh = read(tmp_path, collada(shader=shader))
+    assert (mesh.materials[0].texture is not None) is drawn
+    assert ("the emissive texture of 'skin' is not drawn" in mesh.problems) is not drawn
+
+
 def test_a_file_without_a_scene_shows_its_shapes(tmp_path: Path) -> None:
     document = collada().partition("<library_visual_scenes>")[0] + "</COLLADA>"
     mesh = read(tmp_path, document)

@@ -238,3 +238,11 @@ def test_an_opacity_map_without_texture_coordinates_hides_nothing(tmp_path: Path
     (tmp_path / "head.obj").write_text(f"mtllib head.mtl\n{TETRAHEDRON}usemtl skin\n{FACES}")
     (tmp_path / "head.mtl").write_text("newmtl skin\nKd 1 1 1\nmap_d clear.png\n")
     assert len(read(tmp_path / "head.obj")[0].triangles) == 4
+
+
+@pytest.mark.parametrize("map_kd", ["", "map_Kd skin.png\n"])
+def test_an_emissive_texture_alone_is_noted(tmp_path: Path, map_kd: str) -> None:
+    path = textured_obj(tmp_path)
+    (tmp_path / "head.mtl").write_text(f"newmtl skin\nKd 0 0 0\n{map_kd}map_Ke skin.png\n")
+    _, notes = read(path)
+    assert ("the emissive texture of 'skin' is not drawn" in notes) is not bool(map_kd)

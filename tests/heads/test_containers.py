@@ -72,6 +72,28 @@ def test_a_head_that_comes_in_a_format_that_is_read_too_is_not_skipped(tmp_path:
     assert (len(source.heads), source.skipped) == (1, ())
 
 
+@pytest.mark.parametrize("name", ["more.zip", "more.tar.gz", "bob.obj.gz"])
+def test_an_archive_beside_heads_is_named_unless_it_was_unpacked(tmp_path: Path, name: str) -> None:
+    plain_obj(tmp_path / "anna.obj")
+    (tmp_path / name).write_bytes(b"PK\3\4")
+    source = find_heads(tmp_path)
+    assert len(source.heads) == 1
+    (skip,) = source.skipped
+    assert skip.reason == f"{name} is an archive; unpack it here"
+    plain_obj(tmp_path / "bob.obj" if name.startswith("bob") else tmp_path / "more" / "bob.obj")
+    source = find_heads(tmp_path)
+    assert (len(source.heads), source.skipped) == (2, ())
+
+
+@pytest.mark.parametrize("name", ["a.zip", "source/a.ZIP", "x/y/a.7z"])
+def test_a_download_with_nothing_but_archives_says_which(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / name).write_bytes(b"PK\3\4")
+    with pytest.raises(UsageError) as error:
+        find_heads(tmp_path)
+    assert f"but the archive {name}: unpack it first" in str(error.value)
+
+
 @pytest.mark.parametrize("name", ["heads.zip", "heads.7z"])
 def test_an_archive_is_to_be_unpacked(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"PK\3\4")

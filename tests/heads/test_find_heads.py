@@ -129,7 +129,7 @@ def test_nothing_there_is_one_clear_line(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no heads in"):
         find_heads(tmp_path)
     (tmp_path / "facescape_trainset_001_100.zip").touch()
-    with pytest.raises(UsageError, match="unzip"):
+    with pytest.raises(UsageError, match="unpack it first"):
         find_heads(tmp_path)
     (tmp_path / "notes.txt").touch()
     with pytest.raises(UsageError, match="no heads in"):

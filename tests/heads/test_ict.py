@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 from ict_fixture import fixture_mesh, fixture_modes, obj_text, write_light, write_published
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from generator.errors import HeadError, UsageError
 from generator.geometry.rigid import fit_similarity
 from generator.heads.ict.atlas import Surface, ict_surface
 from generator.heads.ict.make import LICENSE, make_ict_heads
+from generator.heads.ict.mesh import eye_frame
 from generator.heads.ict.shape import apart, expression_modes, head_shape, head_vertices, sample_weights
 from generator.heads.ict.source import EXPRESSIONS, MODES, FaceKit, read_facekit
 from generator.heads.ict.warp import landmark_places
@@ -147,6 +149,16 @@ def test_shells_before_the_eyes_are_left_out(made: Path) -> None:
     assert np.asarray(Image.open(mesh.with_name("lash.png")).convert("RGB")).max() < 60, "and dark"
 
 
+def test_lashes_grow_from_the_lids(surface: Surface) -> None:
+    mesh = surface.mesh
+    lash = mesh.of_part("lashes")
+    up = mesh.uv[mesh.corners[lash].ravel(), 1]
+    away = cKDTree(mesh.neutral[mesh.lid_margin]).query(mesh.neutral[mesh.triangles[lash].ravel()])[0]
+    assert set(up.round(3)) >= {0.0, 1.0}
+    roots, tips = away[up < 0.01].mean(), away[up > 0.99].mean()
+    assert roots < 0.35 and roots < 0.6 * tips, "cm"
+
+
 def test_landmarks_lie_where_paint_expects_them(surface: Surface) -> None:
     numbers, places = landmark_places()
     found = surface.warp.points[surface.mesh.landmarks[numbers]]
@@ -190,7 +202,9 @@ def test_eyes_turn_rigidly(kit: FaceKit, surface: Surface) -> None:
         assert found.rms < 1e-3 and found.scale == pytest.approx(1, abs=1e-5)
         right, up, _ = found.rotation @ [0, 0, 1]
         assert (right, up) == pytest.approx((np.sin(np.deg2rad(20)), 0), abs=1e-4)
-        assert np.linalg.norm(aside[eye].mean(0) - ahead[eye].mean(0)) < 3, "about its own middle"
+        centre, _ = eye_frame(ahead[eye])
+        moved = found.rotation @ centre + found.translation - centre
+        assert np.linalg.norm(moved) < 0.01, "about its own middle"
     skin = np.unique(surface.mesh.triangles[surface.mesh.of_part("skin")])
     assert np.abs(ahead[skin] - aside[skin]).max() < 0.0035, "but for what is told apart"
 

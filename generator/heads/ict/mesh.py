@@ -291,7 +291,7 @@ def _lay_lashes(mesh: IctMesh) -> np.ndarray:
     uv = mesh.uv.copy()
     rows = np.flatnonzero(mesh.of_part("lashes"))
     lids = cKDTree(mesh.neutral[mesh.lid_margin])
-    piece = components(mesh.triangles[rows])
+    piece = components(mesh.corners[rows])  # cards may touch, not so in the texture
     for k in range(piece.max() + 1):
         card = rows[piece == k]
         corners, first = np.unique(mesh.corners[card].ravel(), return_index=True)
