@@ -42,7 +42,7 @@ from generator.landmarks.topology import FACE_MESH
 
 MODES = 12
 SAMPLES = 400
-SPREAD = 0.85
+SPREAD = 0.8
 """Of the figures' own: what the factors bring heads to along each component, where sex, age, ethnicity
 and details alone vary less."""
 

@@ -14,7 +14,7 @@ from generator.landmarks.facing import detected_facing
 from generator.landmarks.topology import Topology
 from generator.placing.anchors import Sighting
 
-SHAPE_SD_DEG = (0.4, 3.3, 0.2)
+SHAPE_SD_DEG = (0.2, 3.6, 0.1)
 """Standard deviation of yaw, pitch and roll of one head's zero over heads whose axes agree by construction,
 as scripts/make_anchors.py prints it for 24: a detector reads a face that is not shaped like its own some
 degrees high or low."""

@@ -112,7 +112,7 @@ def sample_appearance(rng: np.random.Generator, identity: Identity) -> Appearanc
         odds = np.array([0.0, 0.05, 0.20, 0.33, 0.42])
     style = HAIR_STYLES[int(rng.choice(len(HAIR_STYLES), p=odds / odds.sum()))]
     volume = {"bald": (0, 0), "shaved": (0.5, 2), "short": (4, 10), "medium": (9, 18), "long": (7, 13)}[style]
-    beard = BEARDS[int(rng.choice(len(BEARDS), p=[0.34, 0.34, 0.06, 0.10, 0.16]))] if male else "none"
+    beard = BEARDS[int(rng.choice(len(BEARDS), p=[0.40, 0.36, 0.06, 0.07, 0.11]))] if male else "none"
     fringe = style in ("medium", "long") and rng.random() < 0.3
     tucked = rng.random() < 0.4
     made_up = not male and rng.random() < 0.45
@@ -127,7 +127,7 @@ def sample_appearance(rng: np.random.Generator, identity: Identity) -> Appearanc
         lip_red=float(rng.uniform(0.0, 1.0)),
         brow_density=float(rng.uniform(0.65, 1.0) if male else rng.uniform(0.5, 0.95)),
         brow_width=float(rng.uniform(0.9, 1.35) if male else rng.uniform(0.55, 0.9)),
-        brow_height=float(rng.normal(0.004 if male else 0.018, 0.010)),
+        brow_height=float(rng.normal(0.016 if male else 0.028, 0.008)),
         hair_color=hair,
         hair_shade=float(rng.uniform(0.8, 1.25)),
         grey=float(np.clip(rng.normal(1.5 * ageing - 0.45, 0.3), 0, 1)),
@@ -139,7 +139,7 @@ def sample_appearance(rng: np.random.Generator, identity: Identity) -> Appearanc
         curtain_end=float(rng.uniform(5.95, 6.8)),
         curtain_angle=float(rng.uniform(106, 112) if tucked else rng.uniform(57, 72)),
         beard=beard,
-        beard_density=float(rng.uniform(0.35, 1.0)),
+        beard_density=float(rng.uniform(0.3, 0.9)),
         eye_color=eye,
         lashes=float(rng.uniform(0.15, 0.3) if male else rng.uniform(0.3, 0.5)),
         lip_makeup=float(rng.uniform(0.25, 0.8)) if made_up else 0.0,

@@ -105,7 +105,7 @@ _DETAILS = (
 _MEANS = {"mouth/mouth-angles": 0.12, "eyes/{side}-eye-height2": 0.08}
 """Details whose average is not 0: MakeHuman's neutral face looks stern."""
 
-ETHNICITY_SHARE = 0.6
+ETHNICITY_SHARE = 0.4
 """Of how far MakeHuman's ethnicities are apart: they are caricatures, which a detector reads as much as
 9 degrees of pitch apart where it reads people about alike."""
 
