@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from generator.dataset.format.columns import list_of
+from generator.dataset.format.columns import ROWS, Column, columns_at, list_of
+from generator.dataset.format.heads_table import HEADS
 from generator.dataset.format.manifest import configuration_digest, read_manifest, write_manifest
 from generator.dataset.format.part import check_part
 from generator.sealed import sealed
@@ -49,6 +50,21 @@ def as_schema_1_0(root: Path) -> Path:
     configuration = read_manifest(root).configuration
     digest = configuration_digest(configuration)
     _rewrite(root, "1.0.0", older, lambda heads: heads.select(list(HEADS_1_0)))
+    return root
+
+
+def as_schema_1_1(root: Path) -> Path:
+    """Without the columns that came after 1.1, of rows and of heads."""
+
+    def known(table: pa.Table, columns: Mapping[str, Column]) -> pa.Table:
+        names = {column.name for column in columns_at(columns, "1.1.0")}
+        return table.select([name for name in table.schema.names if name in names])
+
+    def older(table: pa.Table) -> pa.Table:
+        rows = known(table, ROWS)
+        return rows.replace_schema_metadata({**rows.schema.metadata, b"headturn.schema_version": b"1.1.0"})
+
+    _rewrite(root, "1.1.0", older, lambda heads: known(heads, HEADS))
     return root
 
 

@@ -16,14 +16,14 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 import typer
-from other_versions import ROWS_1_0, as_schema_1_0, as_schema_1_9
+from other_versions import ROWS_1_0, as_schema_1_0, as_schema_1_1, as_schema_1_9
 from typer.testing import CliRunner
 
 from generator.cli import upgrade as cli_upgrade
 from generator.dataset.export.options import ExportOptions
 from generator.dataset.export.run import export_dataset
 from generator.dataset.format.anchors_table import read_anchors
-from generator.dataset.format.columns import ROWS, SCHEMA_VERSION
+from generator.dataset.format.columns import ROWS, SCHEMA_VERSION, Column
 from generator.dataset.format.compact import compact_dataset
 from generator.dataset.format.digest import content_digest
 from generator.dataset.format.heads_table import read_heads
@@ -47,6 +47,11 @@ class Quiet:
     def stage(self, name: str, total: int) -> None: ...
 
     def advance(self, steps: int = 1) -> None: ...
+
+
+def columns_of(root: Path) -> list[tuple[str, Column]]:
+    """Columns of the rows that a dataset's first part has."""
+    return [(name, ROWS[name]) for name in pq.read_schema(root / PART).names]
 
 
 @pytest.fixture
@@ -240,6 +245,24 @@ def test_upgrade_in_place_and_again(old: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in old.rglob("*")}
     again = upgrade_dataset(old, reporter=Quiet())
     assert not again.changed and {path: path.stat().st_mtime_ns for path in old.rglob("*")} == before
+
+
+def test_upgrade_where_only_heads_got_a_column(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts are rewritten all the same: what version they are of stands in each."""
+    before = as_schema_1_1(dataset)
+    assert "anchor_way" not in pq.read_schema(before / "heads.parquet").names
+    monkeypatch.setattr("generator.dataset.format.defaults.ROWS", dict(columns_of(before)))
+    upgrade_dataset(before, reporter=Quiet())
+    metadata = pq.read_schema(before / PART).metadata
+    assert metadata[b"headturn.schema_version"].decode() == SCHEMA_VERSION
+    assert {head.anchor_way for head in read_heads(before)} == {"head"}
+
+
+def test_upgrade_of_1_1(dataset: Path) -> None:
+    before = as_schema_1_1(dataset)
+    rows = rows_of(before)
+    assert upgrade_dataset(before, reporter=Quiet()).before == "1.1.0"
+    checked(before, rows)
 
 
 def test_upgrade_through_a_link(old: Path, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def todays_schema(stored: pa.Schema, where: str = "the schema") -> pa.Schema:
     """
     version = stored_version(stored)
     later = [c for c in ROWS.values() if is_newer(c.since, version) and c.name not in stored.names]
-    if version_number(version) is None or not is_newer(SCHEMA_VERSION, version) or not later:
+    if version_number(version) is None or not is_newer(SCHEMA_VERSION, version):
         return stored
     topology = topology_of(stored, where)
     fields = {column.name: column.field(topology) for column in later if column.default is not None}
