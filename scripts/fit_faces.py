@@ -67,6 +67,12 @@ INNER_LIPS = (78, 191, 80, 81, 82, 13, 312, 311, 310, 415, 308, 324, 318, 402, 3
 EDGE_SLIP = 4.0
 """Where lips meet and lids end, points lie on either side or on the eye."""
 
+EAR_FADE_DM = 0.35
+"""How far around an ear the cheek goes with it, less and less: nearer there would be an edge."""
+
+EAR_SLIP = 3.0
+"""Points on that cheek cannot have their way: the ear has one of its own."""
+
 LINING_DM = 0.06
 """How widely the edges of lips and lids are averaged for what lies behind them."""
 
@@ -163,6 +169,7 @@ class Fields:
         slip = np.ones(len(at))
         slip[: len(points)] = 1 / np.maximum(self._facing(), LEAST_FACING)
         slip[[*INNER_LIPS, *EYES]] *= EDGE_SLIP
+        slip[: len(points)][places @ sum(_ears()) > 0.02] *= EAR_SLIP
         kernel = _kernel(at, at) + np.diag((noise * slip) ** 2)
         self._weights = np.linalg.solve(kernel, _kernel(at, head))[: len(points)].T
         self._eyes = [fit_eyeball(head[helper]) for helper in template.eye_vertices]
@@ -226,7 +233,7 @@ def _ears() -> tuple[np.ndarray, ...]:
     """How much each source vertex belongs to the left and the right ear, 0-1 [S]."""
     atlas, base = head_atlas(), plain_base()
     away = cKDTree(atlas.points[atlas.ears > 0.5]).query(base)[0]
-    share = smoothstep(0.2, 0.0, away)
+    share = smoothstep(EAR_FADE_DM, 0.0, away)
     return tuple(share * (np.sign(base[:, 0]) == side) for side in (1, -1))
 
 
