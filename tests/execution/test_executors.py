@@ -187,7 +187,7 @@ def test_what_kills_every_lane_is_given_up(opened: Executor, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("opened", EXECUTORS, indirect=True)
 def test_a_full_disk_ends_the_run(opened: Executor, tmp_path: Path) -> None:
-    orders = [unit_order(tmp_path, "disk"), *(unit_order(tmp_path, f"slow-{k}", "bob") for k in range(100))]
+    orders = [unit_order(tmp_path, "disk"), *(unit_order(tmp_path, f"slow-{k}", "bob") for k in range(300))]
     with pytest.raises(DatasetError, match="no space left on device"):
         outcomes_of(opened, orders)
     assert len(lanes_of(tmp_path, "disk")) == 1

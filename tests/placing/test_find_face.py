@@ -101,7 +101,7 @@ def test_a_stray_triangle_a_floor_and_a_second_head_are_left_out(place: Places) 
     }
     for name, points in others.items():
         placement = place(_with(mesh, points, np.array([[0, 1, 2]])))
-        assert np.linalg.norm(np.subtract(placement.pivot, usual.pivot)) < 1.0, name
+        assert np.linalg.norm(np.subtract(placement.pivot, usual.pivot)) < 1.5, name
         assert abs(placement.radius_mm - usual.radius_mm) < 1.0, name
         assert any(note.startswith("1 of ") and "left out" in note for note in placement.notes), name
     both = _with(mesh, mesh.vertices + np.array([350.0, 0, 0]), mesh.triangles)
