@@ -18,6 +18,7 @@ from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors
 from generator.landmarks.shared import SharedAnchors
+from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 
@@ -32,6 +33,8 @@ class RenderOrder:
 
     package: of :func:`generator.heads.package.save_package`. out: a folder for the images.
     passes: render these instead of the picture, see :mod:`generator.plan.passes`.
+    lights: of the environment of each view; none where no view has one.
+    A view with a backdrop is rendered as .exr over nothing, linear with alpha, whatever the format.
     """
 
     package: str
@@ -39,6 +42,7 @@ class RenderOrder:
     out: str
     format: Literal["bmp", "exr"] = "bmp"
     passes: tuple[str, ...] = ()
+    lights: tuple[EnvironmentLight | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,7 @@ class BuildOrder:
     root: the dataset. indices: place of each view's pose in the grid.
     anchors: float64 [P, 3], frame C at the pose zero of the dataset, mm; NaN where there is none.
     configuration_digest: of what all parts of the dataset share.
+    environments, pictures: folders as in :class:`generator.picture.scenery.Folders`.
     """
 
     unit: str
@@ -139,6 +144,8 @@ class BuildOrder:
     landmarks: Landmarks = field(default_factory=Landmarks)
     configuration_digest: str = ""
     earlier_units: tuple[str, ...] = ()
+    environments: str = ""
+    pictures: str = ""
 
     @property
     def part_path(self) -> str:

@@ -19,12 +19,13 @@ MAY_IMPORT = {
     "plan": {"geometry"},
     "heads": {"geometry"},
     "blender": {"plan", "heads", "geometry"},
+    "picture": {"plan", "geometry"},
     "landmarks": {"plan", "heads", "geometry"},
     "dataset": {"landmarks", "plan", "heads", "geometry"},
     "placing": {"landmarks", "plan", "heads", "geometry"},
-    "execution": {"blender", "placing", "landmarks", "dataset", "plan", "heads", "geometry"},
-    "cli": {"execution", "blender", "placing", "landmarks", "dataset", "plan", "heads", "geometry"},
 }
+MAY_IMPORT["execution"] = {*MAY_IMPORT}
+MAY_IMPORT["cli"] = {*MAY_IMPORT}
 
 
 def imports(path: Path) -> set[str]:

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 from pathlib import Path
 from typing import Any
 
+from generator.plan.distribution import Distribution
 from generator.plan.head_source import is_made, split_path
 from generator.plan.settings import (
     PARAMETRIC,
@@ -32,6 +34,7 @@ class Sections:
 
     render: Render
     poses: Poses
+    drawn: Mapping[str, Distribution] = default(default_factory=dict)
 
 
 def _made(values: Values) -> bool:

@@ -15,6 +15,7 @@ from generator.blender.crop import Backdrop, Backdrops, Box, Outline
 from generator.blender.passes import render_passes
 from generator.blender.stage import Stage
 from generator.heads.mesh import HeadMesh
+from generator.plan.environment_light import EnvironmentLight
 from generator.plan.views import View
 
 
@@ -34,14 +35,16 @@ class Images:
         self._alike = 0  # views in a row for which that is the same
         self._backdrops = backdrops or Backdrops()
 
-    def render(self, view: View, path: Path) -> None:
+    def render(self, view: View, path: Path, environment: EnvironmentLight | None = None) -> None:
         """Render a view into path: .bmp (sRGB) or .exr (linear float32).
+
+        environment: lights it, where there is one.
 
         Both are lossless and quick to write; what is kept of an image is encoded by
         the host, without the times and dates that Blender puts into a PNG. Of a
         .bmp only the pixels the head can cover are rendered: the same bytes in less time.
         """
-        stage = self._show(view)
+        stage = self._show(view, environment)
         self._knows_uv = False
         empty = (view.camera.width, view.camera.height, view.look.preset, view.look.background)
         self._alike = self._alike + 1 if empty == self._empty else 1
@@ -62,36 +65,55 @@ class Images:
             _render(path, box)
         backdrop.lay(path, box)
 
+    def render_over_nothing(
+        self, view: View, path: Path, environment: EnvironmentLight | None = None
+    ) -> None:
+        """Render the head alone into path, .exr: linear, half floats, multiplied by alpha."""
+        self._show(view, environment)
+        self._knows_uv = False
+        _render(path, self._outline.box(view.pose, view.camera), over_nothing=True)
+
     def render_passes(self, view: View, path: Path, passes: Sequence[str]) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
-        stage = self._show(view)
+        stage = self._show(view, None)
         if "uv" in passes and not self._knows_uv:
             # Persistent data keeps the mesh as pictures need it, which is without its UV map.
             stage.head.data.update_tag()
             self._knows_uv = True
         render_passes(path, stage.head, passes)
 
-    def _show(self, view: View) -> Stage:
-        if self._stage is None or not self._stage.fits(view.look):
+    def _show(self, view: View, environment: EnvironmentLight | None) -> Stage:
+        has_one = environment is not None
+        if self._stage is None or not self._stage.fits(view.look, has_one):
             self._stage = None
             clear()
-            self._stage = Stage(bpy.context.scene, self._mesh, view.look, threads=self._threads)
-        self._stage.show(view)
+            self._stage = Stage(
+                bpy.context.scene, self._mesh, view.look, threads=self._threads, environment=has_one
+            )
+        self._stage.show(view, environment)
         return self._stage
 
 
-def _render(path: Path, box: Box | None = None) -> None:
-    """Render the scene as it stands into path, or the pixels of a box alone."""
+def _render(path: Path, box: Box | None = None, *, over_nothing: bool = False) -> None:
+    """Render the scene as it stands into path, or the pixels of a box alone.
+
+    over_nothing: with alpha, and as large as the whole image.
+    """
     render = bpy.context.scene.render
     settings = render.image_settings
     compat.use_still_images(settings)
-    if path.suffix == ".exr":
+    render.film_transparent = over_nothing
+    if over_nothing:
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "16"
+        settings.exr_codec = "NONE"
+    elif path.suffix == ".exr":
         settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
     elif path.suffix == ".bmp":
         settings.file_format, settings.color_mode = "BMP", "RGB"
     else:
         raise ValueError(f"{path}: images are .bmp or .exr")
-    render.use_border = render.use_crop_to_border = box is not None
+    render.use_border = box is not None
+    render.use_crop_to_border = box is not None and not over_nothing
     if box is not None:
         # Blender cuts to whole pixels; a quarter more keeps rounding from losing one.
         left, right = ((edge + 0.25) / render.resolution_x for edge in box[:2])

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import bpy
 
+from generator.blender.environment import environment_group
+from generator.blender.nodes import math_node, vector_node
 from generator.heads.mesh import Material
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 
@@ -19,9 +21,12 @@ DIRECTION, STRENGTH = "direction of the light", "strength of the light"
 """Nodes of the fast preset's materials, which :mod:`generator.blender.light` sets."""
 
 
-def build_material(material: Material, preset: str, *, has_vertex_colors: bool) -> bpy.types.Material:
+def build_material(
+    material: Material, preset: str, *, has_vertex_colors: bool, environment: bool = False
+) -> bpy.types.Material:
     """A Blender material with the head's colour and the preset's shading.
 
+    environment: may the light of a panorama be added?
     Raises FileNotFoundError or RuntimeError if the texture cannot be read.
     """
     made = bpy.data.materials.new(material.name)
@@ -33,7 +38,7 @@ def build_material(material: Material, preset: str, *, has_vertex_colors: bool) 
     if preset == "fast":
         # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
         made.cycles.emission_sampling = "NONE"
-        surface = _lit_by_normal(tree, color)
+        surface = _lit_by_normal(tree, color, environment)
     else:
         surface = _principled(tree, color)
     if material.cutout and alpha is not None:
@@ -96,8 +101,11 @@ def _load_image(path: Path) -> bpy.types.Image:
     return image
 
 
-def _lit_by_normal(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """Emission = colour x (ambient + (1 - ambient) x half-Lambert(normal . light)).
+def _lit_by_normal(
+    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, environment: bool
+) -> bpy.types.NodeSocket:
+    """Emission = colour x (ambient + (1 - ambient) x half-Lambert(normal . light)), or what a panorama gives
+    and a share of the key light.
 
     Half-Lambert (Mitchell et al., "Illustrative rendering in Team Fortress 2",
     2007) keeps the shadow side readable. No ray is traced beyond the first hit,
@@ -107,26 +115,24 @@ def _lit_by_normal(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy
     dot = tree.nodes.new("ShaderNodeVectorMath")
     dot.operation, dot.name = "DOT_PRODUCT", DIRECTION
     tree.links.new(geometry.outputs["Normal"], dot.inputs[0])
-    wrapped = _math(tree, "MULTIPLY_ADD", dot.outputs["Value"], 0.5, 0.5)
-    squared = _math(tree, "MULTIPLY", wrapped, wrapped)
-    strength = _math(tree, "MULTIPLY_ADD", squared)
+    wrapped = math_node(tree, "MULTIPLY_ADD", dot.outputs["Value"], 0.5, 0.5)
+    squared = math_node(tree, "MULTIPLY", wrapped, wrapped)
+    strength = math_node(tree, "MULTIPLY_ADD", squared)
     strength.node.name = STRENGTH
     emission = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(color, emission.inputs["Color"])
-    tree.links.new(strength, emission.inputs["Strength"])
+    if environment:
+        # A product rounds as Blender's own of colour and strength does: without a panorama, the same pixels.
+        light = vector_node(tree, "ADD", _environment(tree), strength)
+        tree.links.new(_times(tree, color, light), emission.inputs["Color"])
+    else:
+        tree.links.new(color, emission.inputs["Color"])
+        tree.links.new(strength, emission.inputs["Strength"])
     return emission.outputs[0]
 
 
-def _math(
-    tree: bpy.types.NodeTree, operation: str, *inputs: bpy.types.NodeSocket | float
-) -> bpy.types.NodeSocket:
-    node = tree.nodes.new("ShaderNodeMath")
-    node.operation = operation
-    for socket, value in zip(node.inputs, inputs, strict=False):
-        if isinstance(value, (int, float)):
-            socket.default_value = value
-        else:
-            tree.links.new(value, socket)
+def _environment(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = environment_group()
     return node.outputs[0]
 
 

@@ -38,7 +38,7 @@ def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> 
         scene.cycles.pixel_filter_type = "BOX"
         scene.cycles.filter_width = CENTRE_ONLY
         compat.use_multilayer(render.image_settings)
-        render.use_border = False
+        render.use_border = render.film_transparent = False
         render.filepath = str(path)
         bpy.ops.render.render(write_still=True)
     for switch in switches:

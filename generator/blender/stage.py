@@ -18,6 +18,7 @@ from generator.geometry.rotation import (
     rotation_from_angles,
 )
 from generator.heads.mesh import HeadMesh
+from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 from generator.plan.views import View
 
@@ -34,44 +35,59 @@ class Stage:
     ----------
     mesh: frame U, mm, pivot at the origin.
     look: of the first view. Its preset and samples stay; see :meth:`fits`.
-    threads: of Cycles; 0 lets Blender take every core.
+    threads: of Cycles; 0 lets Blender take every core. environment: may a panorama light it?
 
     Raises FileNotFoundError or RuntimeError if a texture cannot be read.
     """
 
-    def __init__(self, scene: bpy.types.Scene, mesh: HeadMesh, look: Look, *, threads: int = 0) -> None:
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        mesh: HeadMesh,
+        look: Look,
+        *,
+        threads: int = 0,
+        environment: bool = False,
+    ) -> None:
         self.scene = scene
         self._kind = _kind(look)
+        self._knows_environments = environment
         preset = look.preset
-        self.head = _build_head(mesh, preset)
+        self.head = _build_head(mesh, preset, environment)
         scene.collection.objects.link(self.head)
         if preset == "fast":
             # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
             scene.collection.objects.link(_unseen_twin(self.head))
-        self._light: Light = build_light(scene, preset, list(self.head.data.materials))
+        self._light: Light = build_light(scene, preset, list(self.head.data.materials), environment)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(self._camera)
         scene.camera = self._camera
         _set_render(scene, look, threads)
         self._seen_by: Camera | None = None
-        self._look: Look | None = None
+        self._lit: tuple[Look, EnvironmentLight | None] | None = None
 
-    def fits(self, look: Look) -> bool:
-        """Can this stage show a look? Another preset has other materials, and Cycles keeps the sampling
-        pattern of its first number of samples: the image would depend on what was rendered before."""
-        return _kind(look) == self._kind
+    def fits(self, look: Look, environment: bool = False) -> bool:
+        """Can this stage show a look, lit by a panorama or not?
 
-    def show(self, view: View) -> None:
+        Another preset has other materials, and Cycles keeps the sampling pattern of its first number of
+        samples: the image would depend on what was rendered before. In the fast preset a stage for panoramas
+        shows looks without one, too, to the same pixels.
+        """
+        if look.preset != "fast" and environment != self._knows_environments:
+            return False
+        return _kind(look) == self._kind and (self._knows_environments or not environment)
+
+    def show(self, view: View, environment: EnvironmentLight | None = None) -> None:
         """Set pose, camera and look. What stays as it was is not touched. ValueError if it does not fit."""
-        if not self.fits(view.look):
+        if not self.fits(view.look, environment is not None):
             raise ValueError(f"a stage for {self._kind} cannot show {_kind(view.look)}")
         turn(self.head, view.pose)
         if view.camera != self._seen_by:
             set_camera(self.scene, self._camera, view.camera)
             self._seen_by = view.camera
-        if view.look != self._look:
-            self._light.set(view.look)
-            self._look = view.look
+        if (view.look, environment) != self._lit:
+            self._light.set(view.look, environment)
+            self._lit = view.look, environment
 
 
 def _kind(look: Look) -> tuple[str, int]:
@@ -119,7 +135,7 @@ def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
     return twin
 
 
-def _build_head(mesh: HeadMesh, preset: str) -> bpy.types.Object:
+def _build_head(mesh: HeadMesh, preset: str, environment: bool) -> bpy.types.Object:
     made = bpy.data.meshes.new("head")
     faces = len(mesh.triangles)
     vertices = (mesh.vertices * METRES) @ BLENDER_FROM_GRAPHICS.T
@@ -142,7 +158,12 @@ def _build_head(mesh: HeadMesh, preset: str) -> bpy.types.Object:
     made.update(calc_edges=True)
     for material in mesh.materials:
         made.materials.append(
-            build_material(material, preset, has_vertex_colors=mesh.vertex_colors is not None)
+            build_material(
+                material,
+                preset,
+                has_vertex_colors=mesh.vertex_colors is not None,
+                environment=environment,
+            )
         )
     return bpy.data.objects.new("head", made)
 

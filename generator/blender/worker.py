@@ -65,6 +65,7 @@ from generator.messages import (  # noqa: E402
     from_json,
     to_json,
 )
+from generator.plan.render_settings import PLAIN  # noqa: E402
 
 MAX_IMPORT_MIB = 8192
 """What a file may unpack to that is larger than it looks, of which its importer believes what it says."""
@@ -103,10 +104,14 @@ class RenderWorker:
         assert self._images is not None
         for place, view in enumerate(order.views):
             path = Path(order.out) / f"{place:06d}.{order.format}"
+            environment = order.lights[place] if order.lights else None
             if order.passes:
                 self._images.render_passes(view, path, order.passes)
+            elif view.look.backdrop != PLAIN:
+                path = path.with_suffix(".exr")
+                self._images.render_over_nothing(view, path, environment)
             else:
-                self._images.render(view, path)
+                self._images.render(view, path, environment)
             answer(Rendered(place, str(path)))
 
     def _convert(self, order: ConvertOrder) -> None:

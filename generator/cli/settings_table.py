@@ -24,6 +24,8 @@ def _row(setting: Setting) -> list[str]:
         marks.append("a dataset may grow along it")
     if setting.section not in ROWS and not info.content:
         marks.append("does not change pixels or labels")
+    if info.varies:
+        marks.append("may be a distribution")
     if info.path:
         marks.append("a relative path counts from the configuration file")
     choices = "; ".join(f"`{c.value}`: {c.help[0].lower()}{c.help[1:]}" for c in setting.choices if c.help)

@@ -34,6 +34,7 @@ from generator.execution.recorded_heads import RecordedHeads
 from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.messages import BuildOrder, Built, VersionsOrder, expect
+from generator.picture.settled import check_files
 from generator.plan.config import BuildConfig
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Pose
@@ -248,8 +249,9 @@ def _open_lanes(
 ) -> Executor | HeadturnError:
     """Lanes that answer, or why there are none here."""
     try:
+        check_files(config)
         lanes = stack.enter_context(open_executor("local", workers=workers, blender=blender))
-    except UsageError as error:  # no Blender
+    except UsageError as error:  # no Blender, or other panoramas
         return error
     [outcome] = lanes.run([VersionsOrder(config.landmarks)], lambda: None)
     if outcome.receipt is None:

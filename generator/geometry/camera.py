@@ -115,6 +115,22 @@ def framing_distance(
     return margin * radius_mm / reach
 
 
+def framing_lens(
+    radius_mm: float, distance_mm: float, margin: float, projection: Projection = "perspective"
+) -> float:
+    """Focal length, mm, by which a sphere about the pivot just fits: the inverse of :func:`framing_distance`.
+
+    Raises ValueError where the camera stands inside of that sphere.
+    """
+    sine = margin * radius_mm / distance_mm
+    if not 0 < sine < 1:
+        raise ValueError(
+            f"a camera {distance_mm:g} mm away stands inside a head of {margin * radius_mm:g} mm"
+        )
+    reach = sine if projection == "orthographic" else sine / math.sqrt(1 - sine**2)
+    return SENSOR_MM / 2 / reach
+
+
 def isotropic_pixels(
     points_mm: np.ndarray, matrix: np.ndarray, translation_mm: np.ndarray, projection: Sequence[str]
 ) -> np.ndarray:

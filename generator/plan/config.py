@@ -17,6 +17,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from generator.errors import UsageError
 from generator.escape import shortened
+from generator.plan.distribution import (
+    Distribution,
+    is_choice,
+    is_distribution,
+    parse_choice,
+    parse_distribution,
+)
 from generator.plan.head_source import is_made, split_path
 from generator.plan.setting import Choice
 from generator.plan.settings import (
@@ -32,6 +39,7 @@ from generator.plan.settings import (
     plain,
     section_settings,
 )
+from generator.plan.variety import NONE, VARIETY
 from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 
 
@@ -39,6 +47,7 @@ from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 class BuildConfig:
     """Everything that decides a dataset's content, and nothing else.
 
+    drawn: by "section.key", what a setting is drawn from; the setting itself then holds the middle.
     base: where relative paths count from: the folder of the configuration file, the working
     directory for flags.
     """
@@ -48,11 +57,16 @@ class BuildConfig:
     render: Render = field(default_factory=Render)
     landmarks: Landmarks = field(default_factory=Landmarks)
     dataset: Dataset = field(default_factory=Dataset)
+    drawn: Mapping[str, Distribution] = field(default_factory=dict)
     base: Path = field(default_factory=Path.cwd, compare=False)
 
     def as_dict(self) -> Values:
-        """Plain values for JSON, section by section."""
-        return {name: plain_values(getattr(self, name)) for name in SECTIONS}
+        """Plain values for JSON, section by section; distributions as they are written."""
+        values = {name: plain_values(getattr(self, name)) for name in SECTIONS}
+        for name, distribution in self.drawn.items():
+            section, _, key = name.partition(".")
+            values[section][key] = distribution.text
+        return values
 
     @property
     def makes_heads(self) -> bool:
@@ -99,6 +113,12 @@ def load_config(path: Path | None, overrides: Mapping[str, Mapping[str, Any]]) -
         for setting in _paths(overrides):
             before, named = split_path(overrides[setting.section][setting.key])
             values[setting.section][setting.key] = before + str(Path(named).absolute())
+    render = values.get("render", {})
+    if isinstance(render, dict):
+        # What it stands for is recorded, and not its name: a later release may vary otherwise.
+        stands_for = VARIETY.get(str(render.get("variety")), {})
+        settled = {"variety": NONE} if stands_for else {}
+        values = {**values, "render": {**stands_for, **render, **settled}}
     return replace(_validated(values, path or "configuration"), base=base)
 
 
@@ -150,7 +170,7 @@ def plain_values(section: Any) -> dict[str, Any]:
 
 
 def _comparable(config: BuildConfig, setting: Setting) -> Any:
-    value = plain(getattr(getattr(config, setting.section), setting.key))
+    value = config.as_dict()[setting.section][setting.key]
     if setting.info.path and value is not None:
         before, path = split_path(value)
         return before + str(config.located(path)) if path else value
@@ -189,8 +209,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 def _validated(values: Mapping[str, Any], where: object) -> BuildConfig:
     whole = _whole_model(tuple(SECTIONS.items()), tuple(known.choices for known in all_settings()))
+    fixed, drawn = _split(plain(dict(values)), where)
     try:
-        found = whole.model_validate(plain(dict(values)))
+        found = whole.model_validate(fixed)
     except ValidationError as error:
         first = error.errors()[0]
         *section, name = (str(part) for part in first["loc"])
@@ -202,7 +223,28 @@ def _validated(values: Mapping[str, Any], where: object) -> BuildConfig:
             raise UsageError(f"{where}: {place}: no such {kind}; there is {near}") from error
         given = "" if first["type"] == "missing" else f", got {shortened(repr(first['input']))}"
         raise UsageError(f"{where}: {place}: {first['msg']}{given}") from error
-    return BuildConfig(**{name: section(**dict(getattr(found, name))) for name, section in SECTIONS.items()})
+    sections = {name: section(**dict(getattr(found, name))) for name, section in SECTIONS.items()}
+    return BuildConfig(**sections, drawn=drawn)
+
+
+def _split(values: dict[str, Any], where: object) -> tuple[dict[str, Any], dict[str, Distribution]]:
+    """Values with the middle of every distribution in its place, and the distributions by "section.key"."""
+    drawn: dict[str, Distribution] = {}
+    for setting in all_settings():
+        table = values.get(setting.section)
+        if not (setting.info.varies and isinstance(table, dict)):
+            continue
+        given, of_texts = str(table.get(setting.key, "")), setting.kind is str
+        if not (is_choice(given) if of_texts else is_distribution(given)):
+            continue
+        try:
+            low, high = setting.info.low, setting.info.high
+            found = parse_choice(given) if of_texts else parse_distribution(given, low, high)
+        except ValueError as error:
+            raise UsageError(f"{where}: {setting.name}: {shortened(str(error))}") from error
+        drawn[setting.name] = found
+        values = {**values, setting.section: {**values[setting.section], setting.key: found.middle}}
+    return values, drawn
 
 
 @lru_cache(maxsize=16)

@@ -39,6 +39,8 @@ class Info:
     content    it decides pixels or labels, and enters the name of a unit where it is not the default (what
                [heads] and [poses] decide is in the head's files, its placement and the poses)
     path       of a file or folder; a relative one counts from the configuration file
+    varies     it may be a distribution, of which each image or each head draws; see
+               :mod:`generator.plan.distribution`. Of numbers and texts in the sections of a view
     """
 
     help: str
@@ -52,6 +54,7 @@ class Info:
     grows: bool = False
     content: bool = True
     path: bool = False
+    varies: bool = False
 
 
 def setting(default: T, help: str, **info: Any) -> T:

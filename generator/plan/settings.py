@@ -11,20 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Any, Literal, get_type_hints
+from typing import Any, get_type_hints
 
 from generator import registries
 from generator.limits import MAX_HEADS, MAX_POSES, MAX_SEED
+from generator.plan.render_settings import Lens as Lens
+from generator.plan.render_settings import Look as Look
+from generator.plan.render_settings import Projection as Projection
+from generator.plan.render_settings import Render as Render
 from generator.plan.setting import Choice, Setting, setting
 
 PARAMETRIC = "parametric"
 """The head source that is made on the spot."""
-
-PRESET_SAMPLES = {"fast": 1, "quality": 4}
-"""Cycles samples a pixel of each preset, where none are asked for."""
-
-Projection = Literal["perspective", "orthographic"]
-
 
 _AXES = tuple(Choice(sign + axis, label=sign + axis) for axis in "XYZ" for sign in "+-")
 
@@ -143,81 +141,6 @@ class Poses:
         ),
         label="Pose zero",
     )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Lens:
-    """From where an image is taken."""
-
-    resolution: int = setting(
-        256, "Side of the square images", unit="pixels", low=16, high=4096, label="Resolution"
-    )
-    lens_mm: float = setting(
-        85.0, "Focal length on a 36 mm sensor", unit="mm", low=10, high=1000, label="Lens"
-    )
-    projection: Projection = setting(
-        "perspective", "How rays meet the camera",
-        choices=(
-            Choice("perspective", "A real camera"),
-            Choice("orthographic", "Parallel rays, the scale of the lens at the pivot"),
-        ),
-        label="Projection",
-    )  # fmt: skip
-    distance_mm: float | None = setting(
-        None, "Camera to the head's pivot; without it the camera stands where each head just fits",
-        unit="mm", low=100, high=100_000, label="Distance",
-    )  # fmt: skip
-    margin: float = setting(
-        1.05, "Room around a head that is framed; 1 touches the border", low=0.5, high=10, label="Margin",
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Look:
-    """What an image looks like, besides head, pose and camera. Of one image: part of a View."""
-
-    preset: str = setting(
-        "fast", "How light is computed",
-        choices=(
-            Choice("fast", "Light computed from the normal: no noise, quick"),
-            Choice("quality", "Path traced, soft shadows"),
-        ),
-        label="Look",
-    )  # fmt: skip
-    samples: int | None = setting(
-        None, "Cycles samples a pixel; the preset's own where it is not given", low=1, high=4096,
-        label="Samples",
-    )  # fmt: skip
-    light_yaw_deg: float = setting(
-        25.0, "Where the key light stands, seen from the head: above zero towards image left",
-        unit="degrees", low=-180, high=180, flag="--light", label="Light yaw",
-    )  # fmt: skip
-    light_pitch_deg: float = setting(
-        35.0, "Height of the key light, seen from the head",
-        unit="degrees", low=-90, high=90, flag="--light", label="Light pitch",
-    )  # fmt: skip
-    ambient: float = setting(
-        0.35, "Share of the light that comes from everywhere", low=0, high=1, label="Ambient"
-    )
-    background: tuple[float, float, float] = setting(
-        (0.5, 0.5, 0.5), "R,G,B of what is behind the head, sRGB between 0 and 1", low=0, high=1,
-        label="Background",
-    )  # fmt: skip
-
-    @property
-    def cycles_samples(self) -> int:
-        """Samples a pixel: those asked for, or the preset's."""
-        return self.samples or PRESET_SAMPLES[self.preset]
-
-
-@dataclass(frozen=True)
-class Render(Look, Lens):
-    """How images are made: the lens they are seen through, and their look."""
-
-    @property
-    def look(self) -> Look:
-        """The look alone."""
-        return Look(**{f.name: getattr(self, f.name) for f in fields(Look)})
 
 
 @dataclass(frozen=True)

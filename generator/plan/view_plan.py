@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from generator import registries
-from generator.geometry.camera import Camera, framing_distance
+from generator.errors import UsageError
+from generator.geometry.camera import Camera, framing_distance, framing_lens
+from generator.plan.distribution import Distribution
 from generator.plan.draws import draw_seed
 from generator.plan.poses import pose_name
+from generator.plan.render_settings import NOISE
 from generator.plan.settings import Lens, Poses, Render
 from generator.plan.views import Pose, View, Views
 
@@ -32,17 +36,41 @@ class Planned(Protocol):
         """Whose seed draws depend on."""
         ...
 
+    @property
+    def drawn(self) -> Mapping[str, Distribution]:
+        """What settings of render are drawn from, by "section.key"."""
+        ...
+
 
 def framed_camera(lens: Lens, radius_mm: float) -> Camera:
     """The camera of a lens before a head.
 
     radius_mm: of the sphere about the pivot that holds the head. Its distance is the one that was
-    asked for, or where the head just fits, rounded to 0.01 mm.
+    asked for, or where the head just fits into the shorter side, rounded to 0.01 mm; with zoom, the focal
+    length is what makes it fit. Raises UsageError where it would stand inside of the head.
     """
-    distance = lens.distance_mm
-    if distance is None:
-        distance = round(framing_distance(radius_mm, lens.lens_mm, lens.margin, lens.projection), 2)
-    return Camera.square(lens.resolution, lens.lens_mm, distance, lens.projection)
+    width, height = image_size(lens)
+    # A lens is said for the width of the image, and the head has to fit into its shorter side.
+    margin = lens.margin * width / min(width, height)
+    focal, distance = lens.lens_mm, lens.distance_mm
+    try:
+        if distance is None:
+            distance = round(framing_distance(radius_mm, focal, margin, lens.projection), 2)
+        elif lens.zoom:
+            focal = float(f"{framing_lens(radius_mm, distance, margin, lens.projection):.6g}")
+    except ValueError as error:
+        raise UsageError(f"{error}; give a larger --distance") from error
+    principal = None
+    if lens.shift_x or lens.shift_y:
+        principal = (round(width * (0.5 + lens.shift_x), 3), round(height * (0.5 + lens.shift_y), 3))
+    return Camera(width, height, focal, distance, lens.projection, principal)
+
+
+def image_size(lens: Lens) -> tuple[int, int]:
+    """Width and height of the images, pixels."""
+    if lens.aspect >= 1:
+        return lens.resolution, max(1, round(lens.resolution / lens.aspect))
+    return max(1, round(lens.resolution * lens.aspect)), lens.resolution
 
 
 def plan_views(config: Planned, head: str, radius_mm: float, poses: Sequence[Pose]) -> Views:
@@ -51,10 +79,40 @@ def plan_views(config: Planned, head: str, radius_mm: float, poses: Sequence[Pos
     head: subject/expression, on which draws depend. radius_mm: as in :func:`framed_camera`.
     """
     render = config.render
-    views = Views(tuple(poses), (framed_camera(render, radius_mm),), (render.look,))
-    if not len(registries.DRAWS):
-        return views
-    return Views.of([_drawn(view, config.poses.seed, head) for view in views])
+    if not (config.drawn or _is_random(render) or len(registries.DRAWS)):
+        return Views(tuple(poses), (framed_camera(render, radius_mm),), (render.look,))
+    views = []
+    for pose in poses:
+        one = drawn_render(config, head, pose)
+        # Where nothing is random, views need no seed, and units have the name of any other.
+        seed = view_seed(config.poses.seed, head, pose) if _is_random(one) else 0
+        view = View(pose, framed_camera(one, radius_mm), one.look, seed)
+        views.append(_drawn(view, config.poses.seed, head))
+    return Views.of(views)
+
+
+def _is_random(render: Render) -> bool:
+    return bool(render.noise) or render.backdrop == NOISE
+
+
+def drawn_render(config: Planned, head: str, pose: Pose) -> Render:
+    """The settings of one image: each that is a distribution is drawn.
+
+    A draw depends on the seed, the head, the setting's name and, where each image has its own, the pose:
+    not on what else is drawn, nor on which images there are.
+    """
+    values: dict[str, Any] = {}
+    for name, distribution in config.drawn.items():
+        whose = (head,) if distribution.per_head else (head, pose_name(*pose))
+        rng = np.random.default_rng(draw_seed(config.poses.seed, name, *whose))
+        values[name.partition(".")[2]] = distribution.draw(rng)
+    return replace(config.render, **values)
+
+
+def view_seed(seed: int, head: str, pose: Pose) -> int:
+    """The seed of what is random in one image."""
+    start, drawn = draw_seed(seed, "picture", head, pose_name(*pose))
+    return drawn ^ start
 
 
 def _drawn(view: View, seed: int, head: str) -> View:

@@ -23,27 +23,32 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class View:
-    """One image of a head: at which pose, through which camera, with which look."""
+    """One image of a head: at which pose, through which camera, with which look.
+
+    seed: of what is random in it, such as noise.
+    """
 
     pose: Pose
     camera: Camera
     look: Look
+    seed: int = 0
 
 
 @dataclass(frozen=True)
 class Views(Sequence[View]):
     """Some views in order; what all of them share stands here once.
 
-    poses: one a view. cameras, looks: one a view, or a single one for all.
+    poses: one a view. cameras, looks, seeds: one a view, or a single one for all.
     Raises ValueError if there is another number of them.
     """
 
     poses: tuple[Pose, ...]
     cameras: tuple[Camera, ...]
     looks: tuple[Look, ...]
+    seeds: tuple[int, ...] = (0,)
 
     def __post_init__(self) -> None:
-        for name in ("cameras", "looks"):
+        for name in ("cameras", "looks", "seeds"):
             count = len(getattr(self, name))
             if count not in (1, len(self.poses)):
                 raise ValueError(f"{name}: expected 1 or {len(self.poses)}, got {count}")
@@ -55,6 +60,7 @@ class Views(Sequence[View]):
             tuple(view.pose for view in views),
             _once([view.camera for view in views]),
             _once([view.look for view in views]),
+            _once([view.seed for view in views]),
         )
 
     def __len__(self) -> int:
@@ -70,10 +76,12 @@ class Views(Sequence[View]):
         if isinstance(place, slice):
             cameras = self.cameras if len(self.cameras) == 1 else self.cameras[place]
             looks = self.looks if len(self.looks) == 1 else self.looks[place]
-            return Views(self.poses[place], cameras, looks)
+            seeds = self.seeds if len(self.seeds) == 1 else self.seeds[place]
+            return Views(self.poses[place], cameras, looks, seeds)
         pose = self.poses[place]  # raises IndexError past the end, which ends a loop
         camera = self.cameras[place if len(self.cameras) > 1 else 0]
-        return View(pose, camera, self.looks[place if len(self.looks) > 1 else 0])
+        look = self.looks[place if len(self.looks) > 1 else 0]
+        return View(pose, camera, look, self.seeds[place if len(self.seeds) > 1 else 0])
 
     def __iter__(self) -> Iterator[View]:
         return (self[place] for place in range(len(self)))

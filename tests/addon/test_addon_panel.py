@@ -49,7 +49,8 @@ def test_rows_are_what_means_something_in_the_order_of_the_table() -> None:
     }  # fmt: skip
     assert all(row.parts == 0 for row in panel.rows(("poses",), {"poses": {"kind": "grid"}}))
     look = names(("render",), {})
-    assert look[:2] == ["render_resolution", "render_lens_mm"] and look[-1] == "render_background"
+    assert look[:3] == ["render_variety", "render_resolution", "render_lens_mm"]
+    assert look[-1] == "render_backdrop"
     assert names(panel.other_sections(), {})[0] == "landmarks_min_confidence"
 
 

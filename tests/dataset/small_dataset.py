@@ -28,6 +28,7 @@ from generator.geometry.rotation import rotation_from_angles
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import PosePlans, poses_csv
 from generator.plan.poses import PosePlan, grid_plan
+from generator.plan.settings import Look
 
 VERSIONS = {"headturn": "0.0.0", "numpy": np.__version__}
 CAMERA = Camera.square(64, lens_mm=85.0, distance_mm=700.0)
@@ -96,6 +97,7 @@ def unit_rows(head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAM
         angles_deg=angles,
         indices=plan.indices[chosen],
         cameras=(camera,),
+        looks=(Look(),),
         detected=detected,
         landmarks=landmarks,
         anchors=face_anchors(),

@@ -27,7 +27,7 @@ from generator.dataset.format.row_cameras import RowCameras
 from generator.dataset.format.schema import part_schema
 from generator.dataset.format.unit_rows import UnitRows, unit_table
 from generator.dataset.proof import part_checks
-from generator.dataset.proof.context import planned_cameras
+from generator.dataset.proof.context import planned_views
 from generator.dataset.proof.pass_checks import disagreement, projection_error_px
 from generator.dataset.proof.verify import verify_dataset
 from generator.dataset.show.fitted import Fitted
@@ -36,6 +36,8 @@ from generator.dataset.show.report.page import report_data
 from generator.errors import DatasetError
 from generator.geometry.camera import Camera, isotropic_pixels
 from generator.geometry.rotation import rotation_from_angles
+from generator.plan.settings import Look
+from generator.plan.views import View
 
 CAMERAS = tuple(
     Camera.square(64, 40.0 + 5 * k, 500.0 + 20 * k, "orthographic" if k % 3 == 0 else "perspective")
@@ -70,7 +72,11 @@ small_dataset_rows = small_dataset.unit_rows
 def dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(small_dataset, "unit_rows", many_cameras)
     small_dataset.build_dataset(tmp_path / "d")
-    monkeypatch.setattr(part_checks, "planned_cameras", lambda *_: lambda head, pose: CAMERAS[pose])
+    monkeypatch.setattr(
+        part_checks,
+        "planned_views",
+        lambda *_: lambda head, pose: View((0.0, 0.0, 0.0), CAMERAS[pose], Look()),
+    )
     return tmp_path / "d"
 
 
@@ -166,7 +172,7 @@ def test_a_configuration_that_is_none_is_one_line(tmp_path: Path) -> None:
     manifest = small_dataset.build_dataset(tmp_path / "d")
     wrong = replace(manifest, configuration={"render": {"resolution": "big"}})
     with pytest.raises(DatasetError, match=r"its configuration cannot be read .*render\.resolution"):
-        planned_cameras(read_heads(tmp_path / "d"), None, wrong, tmp_path / "d")
+        planned_views(read_heads(tmp_path / "d"), None, wrong, tmp_path / "d")
 
 
 def test_images_that_are_not_square_keep_their_shape() -> None:

@@ -117,6 +117,7 @@ class NoRenderer:
             angles_deg=order.views.angles_deg,
             indices=np.array(order.indices, dtype=np.int16),
             cameras=order.views.cameras,
+            looks=order.views.looks,
             detected=np.ones(count, dtype=bool),
             landmarks=np.full((count, points, 3), 8.0, dtype=np.float32),
             anchors=order.anchors,

@@ -198,11 +198,11 @@ def test_a_setting_touches_the_table_and_the_place_that_uses_it(
 ) -> None:
     """In a copy of the package: exposure as an option, in TOML, in the documentation, in the images."""
     shutil.copytree(ROOT / "generator", tmp_path / "generator")
-    table = tmp_path / "generator" / "plan" / "settings.py"
+    table = tmp_path / "generator" / "plan" / "render_settings.py"
     before, mark, after = table.read_text().partition("    ambient: float = setting(")
     table.write_text(before + EXPOSURE + mark + after)
     use = tmp_path / "generator" / "blender" / "stage.py"
-    before, mark, after = use.read_text().partition("            self._light.set(view.look)\n")
+    before, mark, after = use.read_text().partition("            self._light.set(view.look, environment)\n")
     assert mark
     use.write_text(
         before + mark + "            self.scene.view_settings.exposure = view.look.exposure\n" + after

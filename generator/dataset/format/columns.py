@@ -17,6 +17,7 @@ import numpy as np
 import pyarrow as pa
 
 from generator.landmarks.topology import Topology
+from generator.plan.settings import Look, section_settings
 
 if TYPE_CHECKING:
     from generator.dataset.format.unit_rows import UnitRows
@@ -148,6 +149,28 @@ def columns_at(table: Mapping[str, Column], version: str) -> list[Column]:
     return [column for column in table.values() if (version_number(column.since) or (0, 0, 0)) <= number]
 
 
+LOOKS = {f"look_{one.key}": one.key for one in section_settings("look", Look) if one.info.varies}
+"""Columns of what an image looks like, and the field of the look that each one holds."""
+
+
+def _look_column(name: str, key: str) -> Column:
+    """What was drawn for each image, or set for all."""
+    [known] = [one for one in section_settings("look", Look) if one.key == key]
+    unit = f", {known.info.unit}" if known.info.unit else ""
+    meaning = f"{known.info.help[0].lower()}{known.info.help[1:]}{unit}"
+    of_texts = known.kind is str
+    return Column(
+        name,
+        pa.string() if of_texts else pa.float64(),
+        meaning,
+        "look",
+        lambda rows: rows.of_looks(lambda look: getattr(look, key)),
+        Compare() if of_texts else Compare("floats"),
+        since="1.2.0",
+        default="" if of_texts else float("nan"),
+    )
+
+
 def _row_columns() -> tuple[Column, ...]:
     text, number, index = pa.string(), pa.float64(), pa.int16()
     same, placed, image = Compare(), "every row once", "images"
@@ -187,6 +210,7 @@ def _row_columns() -> tuple[Column, ...]:
         Column("projection", text, "perspective or orthographic", "camera",
                lambda rows: rows.of_cameras(lambda camera: camera.projection), same,
                since="1.1.0", default="perspective"),
+        *(_look_column(name, key) for name, key in LOOKS.items()),
         Column("detected", pa.bool_(), "did the detector find the face?", "landmarks",
                lambda rows: rows.detected, Compare(says="detected was {then}, is {now}")),
         Column("landmarks", PerPoint(pa.float32(), 3),

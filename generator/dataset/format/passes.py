@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from generator.dataset.format.exr_header import check_exr
 from generator.dataset.format.files import one_line
 from generator.errors import DatasetError, UsageError, WorkerError
+from generator.exr_header import check_exr
 from generator.plan.passes import OBJECT_INDEX, Pass
 from generator.process import native_silence
 from generator.registries import PASSES

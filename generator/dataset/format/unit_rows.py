@@ -25,6 +25,7 @@ from generator.geometry.camera import Camera
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 from generator.landmarks.topology import FACE_MESH, Topology
 from generator.plan.poses import pose_name
+from generator.plan.settings import Look
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class UnitRows:
     """One head, N poses, P landmarks.
 
     angles_deg     float64 [N, 3] (yaw, pitch, roll); indices int16 [N, 3]: rows of a PosePlan
-    cameras        one for all rows, or N
+    cameras, looks one for all rows, or N
     detected       bool [N]
     landmarks      float32 [N, P, 3], isotropic pixels, frame C; NaN where not detected
     anchors        float64 [P, 3], the points on the mesh at pose zero, frame C, mm, pivot at
@@ -53,6 +54,7 @@ class UnitRows:
     angles_deg: np.ndarray
     indices: np.ndarray
     cameras: tuple[Camera, ...]
+    looks: tuple[Look, ...]
     detected: np.ndarray
     landmarks: np.ndarray
     anchors: np.ndarray
@@ -77,8 +79,9 @@ class UnitRows:
         for name, (actual, expected) in shapes.items():
             if actual != expected:
                 raise ValueError(f"{name}: expected shape {expected}, got {actual}")
-        if len(self.cameras) not in (1, count):
-            raise ValueError(f"cameras: expected 1 or {count}, got {len(self.cameras)}")
+        for name in ("cameras", "looks"):
+            if len(getattr(self, name)) not in (1, count):
+                raise ValueError(f"{name}: expected 1 or {count}, got {len(getattr(self, name))}")
         finite = np.isfinite(self.landmarks).all(axis=(1, 2))
         missing = np.isnan(self.landmarks).all(axis=(1, 2))
         if not np.where(self.detected, finite, missing).all():
@@ -109,6 +112,11 @@ class UnitRows:
     def of_cameras(self, value: Callable[[Camera], Any]) -> list[Any]:
         """What value says of each row's camera."""
         values = [value(camera) for camera in self.cameras]
+        return values if len(values) == len(self) else values * len(self)
+
+    def of_looks(self, value: Callable[[Look], Any]) -> list[Any]:
+        """What value says of each row's look."""
+        values = [value(look) for look in self.looks]
         return values if len(values) == len(self) else values * len(self)
 
     @property

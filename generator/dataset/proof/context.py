@@ -16,17 +16,16 @@ from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.schema import is_newer
 from generator.errors import DatasetError, UsageError
-from generator.geometry.camera import Camera
 from generator.plan.config import BuildConfig, recorded_config
 from generator.plan.settings import known_values
 from generator.plan.view_plan import plan_views
-from generator.plan.views import Views
+from generator.plan.views import View, Views
 
 HEADS_AT_HAND = 8
 """Heads whose views are kept: the parts of a head lie together."""
 
-ExpectedCamera = Callable[[int, int], Camera]
-"""(place in heads.parquet, place in the head's plan) -> the camera that row has to have."""
+ExpectedView = Callable[[int, int], View]
+"""(place in heads.parquet, place in the head's plan) -> the view that row has to be."""
 
 
 def known_config(manifest: Manifest, root: Path) -> BuildConfig:
@@ -45,12 +44,12 @@ def known_config(manifest: Manifest, root: Path) -> BuildConfig:
         ) from error
 
 
-def planned_cameras(
+def planned_views(
     heads: Sequence[HeadRow], poses: DatasetPoses, manifest: Manifest, root: Path
-) -> ExpectedCamera:
-    """The cameras that the recorded configuration plans for heads of the recorded sizes.
+) -> ExpectedView:
+    """The views that the recorded configuration plans for heads of the recorded sizes.
 
-    Neither heads.parquet nor the rows are asked: their cameras are what is to be proved.
+    Neither heads.parquet nor the rows are asked: their cameras and looks are what is to be proved.
     Raises DatasetError if the configuration is none.
     """
     config = known_config(manifest, root)
@@ -61,7 +60,7 @@ def planned_cameras(
         angles = poses.plan(head).angles_deg.tolist()
         return plan_views(config, f"{row.subject}/{row.expression}", row.radius_mm, [*map(tuple, angles)])
 
-    return lambda head, pose: views(head)[pose].camera
+    return lambda head, pose: views(head)[pose]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ class RowContext:
     root: Path
     images: ImageMode
     anchors: np.ndarray
-    expected_camera: ExpectedCamera
+    expected_view: ExpectedView
     heads: Sequence[HeadRow] = ()
     poses: DatasetPoses | None = None
     split: str = ""

@@ -25,7 +25,7 @@ from generator.dataset.format.parquet import open_parquet
 from generator.dataset.format.part import iter_stored, part_schema_of, reading
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer, part_schema
-from generator.dataset.proof.context import RowContext, planned_cameras
+from generator.dataset.proof.context import RowContext, planned_views
 from generator.dataset.proof.row_checks import row_checks
 from generator.dataset.proof.verify_report import Check
 from generator.errors import HeadturnError
@@ -81,7 +81,7 @@ class PartChecker:
             heads=heads,
             poses=poses,
             anchors=points,
-            expected_camera=planned_cameras(heads, poses, manifest, root),
+            expected_view=planned_views(heads, poses, manifest, root),
         )
         common = configuration_digest(parts_configuration(manifest))
         self._schema = part_schema(manifest.images, {}, common, topology, manifest.schema_version)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.format.columns import ROWS, SCHEMA_VERSION, columns_at
+from generator.dataset.format.columns import LOOKS, ROWS, SCHEMA_VERSION, columns_at
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.open import as_array
@@ -69,7 +69,7 @@ def rotation_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:
 def camera_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
     """Size, K, translation and projection against the camera that the row has to have."""
     places = zip(context.head_index.tolist(), context.pose_index.tolist(), strict=True)
-    cameras = [context.expected_camera(head, pose) for head, pose in places]
+    cameras = [context.expected_view(head, pose).camera for head, pose in places]
     facts = {
         camera: (camera.matrix.reshape(-1), camera.translation_mm, [camera.width, camera.height])
         for camera in dict.fromkeys(cameras)
@@ -83,6 +83,22 @@ def camera_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
     projections = batch.column("projection").to_pylist()
     wrong = np.array([p != camera.projection for p, camera in zip(projections, cameras, strict=True)])
     yield from named(batch, wrong, "projection is not what the configuration plans")
+
+
+def look_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
+    """Every draw of the look against the one that the configuration, its seed and the row's name give."""
+    places = zip(context.head_index.tolist(), context.pose_index.tolist(), strict=True)
+    looks = [context.expected_view(head, pose).look for head, pose in places]
+    for name, key in LOOKS.items():
+        expected = np.array([getattr(look, key) for look in looks])
+        # In a dataset that is older than the column there is NaN or no text.
+        if expected.dtype.kind == "U":
+            said = np.array(batch.column(name).to_pylist())
+            off = (said != expected) & (said != "")
+        else:
+            said = as_array(batch, name)
+            off = (said != expected) & ~np.isnan(said)
+        yield from named(batch, off, f"{name} is not what the configuration plans")
 
 
 def landmark_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:
@@ -139,6 +155,7 @@ ROW_CHECKS: Mapping[str, RowCheck] = {
     "identity": identity_problems,
     "rotation": rotation_problems,
     "camera": camera_problems,
+    "look": look_problems,
     "landmarks": landmark_problems,
     "exact landmarks": exact_problems,
     "images": image_problems,

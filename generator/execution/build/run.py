@@ -57,6 +57,7 @@ from generator.execution.executors.executor import Executor
 from generator.execution.status import LoggingReporter, Reporter
 from generator.heads.head import SkippedHead
 from generator.messages import BuildOrder, Built, expect
+from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, differences, recorded_config
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE, plan_poses, read_pose_plans, shared_plan
@@ -107,6 +108,7 @@ def build(
     """
     root = root.absolute()
     shared_plan(config)  # what makes no sense is said before a folder is made
+    config = settled(config)
     claim(root)
     with locked(root) as lock:
         if fresh:
@@ -246,7 +248,7 @@ def is_finished(config: BuildConfig, root: Path) -> bool:
     if not (root / MANIFEST_FILE).is_file():
         return False
     manifest = read_manifest(root)
-    same = not differences(config, recorded_config(manifest.configuration, root))
+    same = not differences(settled(config), recorded_config(manifest.configuration, root))
     return same and not manifest.failures and not manifest.skipped
 
 

@@ -99,7 +99,7 @@ def _context(root: Path, order: BuildOrder, start: int, count: int) -> RowContex
         root=root,
         images=cast(ImageMode, order.images),
         anchors=order.anchors[None],
-        expected_camera=lambda _, pose: order.views[pose].camera,
+        expected_view=lambda _, pose: order.views[pose],
         split=order.split,
         head_index=np.zeros(count, np.int32),
         pose_index=np.arange(start, start + count, dtype=np.int32),

@@ -21,6 +21,7 @@ from generator.heads.head import Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors
 from generator.messages import BuildOrder
+from generator.picture.scenery import folders_of
 from generator.plan.config import BuildConfig
 from generator.plan.settings import ROWS, beyond_defaults
 from generator.plan.view_plan import framed_camera, plan_views
@@ -97,6 +98,8 @@ def plan_units(
         for chunk in poses.of(head.subject, head.expression):
             views = plan_views(config, head.name, planned.placement.radius_mm, chunk.poses)
             seen = [to_plain(views.cameras), to_plain(views.looks)]
+            if any(views.seeds):
+                seen.append(list(views.seeds))
 
             def name(indices: Any, chunk: Chunk = chunk, seen: Any = seen, fixed: str = fixed) -> str:
                 return _digest([fixed, seen, chunk.poses, indices])[:16]
@@ -127,6 +130,7 @@ def build_order(
     root: Path,
 ) -> BuildOrder:
     """An order for some views of a placed head, without a name yet. points: see BuildOrder.anchors."""
+    folders = folders_of(config)
     return BuildOrder(
         unit="unnamed",
         head=head,
@@ -140,6 +144,8 @@ def build_order(
         image_format=config.dataset.image_format,
         passes=config.dataset.passes,
         landmarks=config.landmarks,
+        environments=folders.environments,
+        pictures=folders.pictures,
     )
 
 

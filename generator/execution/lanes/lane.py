@@ -28,6 +28,7 @@ from generator.dataset.format.schema import ImageMode, part_schema
 from generator.errors import HeadError, WorkerError
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.renderer import Renderer
+from generator.execution.lanes.shots import Shots
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
@@ -48,8 +49,8 @@ from generator.messages import (
     Versions,
     VersionsOrder,
 )
+from generator.picture.scenery import Folders
 from generator.placing.placer import Placer
-from generator.placing.rendering import read_image
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 from generator.process import resident_mib
@@ -75,6 +76,7 @@ class Lane:
         self._scratch = Path(options.scratch)
         self._memory_mib = options.memory_mib
         self.renderer = self._open_renderer("frames", options, options.blender)
+        self.shots = Shots(self.renderer)
         self._places = self.renderer
         if options.blender is not None and find_spec("bpy") is not None:
             # Where a head stands is read off renders, and every Blender renders a little differently.
@@ -180,14 +182,12 @@ class Lane:
         detected = np.zeros(len(views), dtype=bool)
         suffix, flags = ENCODING[order.image_format]
         images: list[bytes] = []
-        rendered = self.renderer.render(package, views)
+        rendered = self.shots.start(package, views, Folders(order.environments, order.pictures))
         for row, view in enumerate(views):
             with _timed(seconds, "wait for render"):
                 path = next(rendered)
             with _timed(seconds, "encode"):
-                image = read_image(path)
-                if image.shape != (view.camera.height, view.camera.width, 3):
-                    raise WorkerError(f"{path}: the render worker left an image of another size")
+                image = self.shots.finish(path, view)
                 images.append(_encoded(image, suffix, flags))
             with _timed(seconds, "detect"):
                 found = detector.detect(image)
@@ -209,6 +209,7 @@ class Lane:
             angles_deg=views.angles_deg,
             indices=np.array(order.indices, dtype=np.int16).reshape(-1, 3),
             cameras=views.cameras,
+            looks=views.looks,
             detected=detected,
             landmarks=landmarks,
             anchors=order.anchors,

@@ -17,7 +17,8 @@ from generator.heads.head import NEUTRAL
 from generator.heads.package import save_package
 from generator.heads.source import find_heads
 from generator.heads.surroundings import head_alone
-from generator.placing.rendering import read_image
+from generator.picture.scenery import folders_of
+from generator.picture.settled import settled
 from generator.plan.config import BuildConfig
 from generator.plan.view_plan import plan_views
 from generator.process import native_silence
@@ -43,6 +44,7 @@ def render_preview(
     if picture.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise UsageError(f"{picture}: the picture's name must end in .png or .jpg")
     rotation_from_angles(np.array(pose))
+    config = settled(config)
     wanted = config.heads
     source = find_heads(
         config.located(wanted.source),
@@ -68,8 +70,8 @@ def render_preview(
             placement = lane.placer(config.landmarks).face(head, mesh)
             package = scratch / "preview.npz"
             save_package(placement.normalise(head_alone(mesh, placement)), package)
-            [path] = lane.renderer.render(package, plan_views(config, head.name, placement.radius_mm, [pose]))
-            image = read_image(path)
+            views = plan_views(config, head.name, placement.radius_mm, [pose])
+            [image] = lane.shots.take(package, views, folders_of(config))
             found = lane.detector(config.landmarks).detect(image)
         finally:
             lane.close()

@@ -48,7 +48,8 @@ from generator.heads.head import Head, HeadSource
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.surroundings import head_alone
-from generator.placing.rendering import read_image
+from generator.picture.scenery import folders_of
+from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.pose_plans import plan_poses
 from generator.plan.settings import Values
@@ -126,11 +127,12 @@ class PreviewServer:
         landmarks: bool,
         sheet: int = 0,
     ) -> dict[str, Any]:
+        config = settled(config)
         views = plan_views(config, head, radius_mm, [(y, p, r) for y, p, r in poses])
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths, found, tiles = [], [], []
-        for index, image in enumerate(self._render(Path(package), views)):
+        for index, image in enumerate(self._render(Path(package), views, config)):
             detector = self._open_lane().detector(config.landmarks) if landmarks else None
             points = detector.detect(image) if detector else None
             found.append(None if points is None else np.round(points[:, :2], 2).tolist())
@@ -163,7 +165,7 @@ class PreviewServer:
             self._package(head, placement, package)
             small = load_config(None, {"render": {"resolution": pixels}})
             views = plan_views(small, head.name, placement.radius_mm, [(0.0, 0.0, 0.0)])
-            [image] = self._render(package, views)
+            [image] = self._render(package, views, small)
             picture.parent.mkdir(parents=True, exist_ok=True)
             half = picture.with_name(f".{os.getpid()}-{picture.name}")  # another Blender may write it too
             _write(image, half)
@@ -196,8 +198,8 @@ class PreviewServer:
         save_package(placement.normalise(head_alone(mesh, placement)), target)
         return mesh.problems, len(mesh.vertices)
 
-    def _render(self, package: Path, views: Views) -> Iterator[np.ndarray]:
-        return map(read_image, self._open_lane().renderer.render(package, views))
+    def _render(self, package: Path, views: Views, config: BuildConfig) -> Iterator[np.ndarray]:
+        return self._open_lane().shots.take(package, views, folders_of(config))
 
     def _open_lane(self) -> Lane:
         if self._lane is None:

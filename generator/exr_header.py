@@ -8,6 +8,7 @@ empty name; a file of parts has a list of attributes a part, up to an empty one.
 from __future__ import annotations
 
 import struct
+from collections.abc import Collection
 from pathlib import Path
 
 from generator.reading import check_regular
@@ -27,8 +28,16 @@ _ZLIB_RATIO, _SLACK = 1040, 1 << 16
 """zlib packs no better."""
 
 
-def check_exr(path: Path) -> None:
+def check_exr(
+    path: Path,
+    *,
+    max_side: int = MAX_SIDE,
+    compressions: Collection[int] = _COMPRESSIONS,
+    max_bytes: int = 1 << 40,
+) -> None:
     """Is it an image of lines, of a sane size, with a header that can be read?
+
+    max_bytes: of its pixels, unpacked.
 
     Raises
     ------
@@ -50,7 +59,7 @@ def check_exr(path: Path) -> None:
         parts += 1
         if parts > MAX_PARTS:
             raise ValueError(f"more than {MAX_PARTS} parts")
-        _check_part(attributes, size)
+        _check_part(attributes, size, max_side, compressions, max_bytes)
         if not flags & _PARTS:
             return
 
@@ -88,7 +97,9 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
     return text, end + 1
 
 
-def _check_part(attributes: dict[str, bytes], size: int) -> None:
+def _check_part(
+    attributes: dict[str, bytes], size: int, max_side: int, compressions: Collection[int], max_bytes: int
+) -> None:
     try:
         left, top, right, bottom = struct.unpack("<4i", attributes["dataWindow"])
         [compression] = struct.unpack("<B", attributes["compression"])
@@ -96,9 +107,9 @@ def _check_part(attributes: dict[str, bytes], size: int) -> None:
     except (KeyError, struct.error) as error:
         raise ValueError("its header lacks what every OpenEXR has") from error
     width, height = right - left + 1, bottom - top + 1
-    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise ValueError(f"{width} x {height} pixels, expected 1 to {MAX_SIDE} a side")
-    if compression not in _COMPRESSIONS:
+    if not (1 <= width <= max_side and 1 <= height <= max_side):
+        raise ValueError(f"{width} x {height} pixels, expected 1 to {max_side} a side")
+    if compression not in compressions:
         raise ValueError("a compression that no passes have")
     count, stored = 0, 0
     at = 0
@@ -115,5 +126,7 @@ def _check_part(attributes: dict[str, bytes], size: int) -> None:
         count, stored = count + 1, stored + _WIDTHS[kind] * width * height
     if not 1 <= count <= MAX_CHANNELS or at != len(channels):
         raise ValueError(f"{count} channels, expected 1 to {MAX_CHANNELS}")
+    if stored > max_bytes:
+        raise ValueError("more pixels than such a file may have")
     if stored > _ZLIB_RATIO * size + _SLACK:
         raise ValueError("fewer bytes than its pixels need")

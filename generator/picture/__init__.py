@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rendered image as a camera would have taken it. No bpy."""
