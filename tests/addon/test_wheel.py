@@ -139,13 +139,12 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
     tree = tmp_path / "tree"
     for name in ("generator", "blender_addon", "scripts", "LICENSES"):
         shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
-    table = tree / "generator" / "plan" / "settings.py"
-    text = table.read_text(encoding="utf-8")
     for section, lines in LINES.items():
+        table = tree / "generator" / "plan" / ("render_settings.py" if section == "Look" else "settings.py")
+        text = table.read_text(encoding="utf-8")
         start = text.index(f"class {section}:")
         end = min(k for k in (text.find(mark, start) for mark in ("\n\n\n", "\n    @property")) if k > 0)
-        text = text[:end] + lines.rstrip() + text[end:]
-    table.write_text(text, encoding="utf-8")
+        table.write_text(text[:end] + lines.rstrip() + text[end:], encoding="utf-8")
     (tree / "generator" / "plan" / "stand_back.py").write_text(DRAW, encoding="utf-8")
     registries = tree / "generator" / "registries.py"
     text, entry = registries.read_text(encoding="utf-8"), '{"back": "generator.plan.stand_back:stand_back"}'
