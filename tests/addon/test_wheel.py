@@ -8,6 +8,7 @@ separated by colons (`make test-bpy`).
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -71,6 +72,8 @@ def head(placed_head: PlacedHead, tmp_path_factory: pytest.TempPathFactory) -> P
     save_package(placed_head.mesh, package)
     return package
 
+
+RENDER = ("Lens", "Look", "Render")
 
 LINES = {
     "Look": """
@@ -140,9 +143,9 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
     for name in ("generator", "blender_addon", "scripts", "LICENSES"):
         shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
     for section, lines in LINES.items():
-        table = tree / "generator" / "plan" / ("render_settings.py" if section == "Look" else "settings.py")
+        table = tree / "generator" / "plan" / ("render_settings.py" if section in RENDER else "settings.py")
         text = table.read_text(encoding="utf-8")
-        start = text.index(f"class {section}:")
+        start = re.search(rf"^class {section}[:(]", text, re.MULTILINE).start()
         end = min(k for k in (text.find(mark, start) for mark in ("\n\n\n", "\n    @property")) if k > 0)
         table.write_text(text[:end] + lines.rstrip() + text[end:], encoding="utf-8")
     (tree / "generator" / "plan" / "stand_back.py").write_text(DRAW, encoding="utf-8")
