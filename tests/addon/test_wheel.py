@@ -170,7 +170,7 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
     }.items():
         said = subprocess.run(
             [sys.executable, "-c", code, str(tmp_path / f"{name}.toml")],
-            check=True, capture_output=True, text=True, cwd=tree,
+            check=True, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(tree)},
         ).stdout  # fmt: skip
         assert said.strip() == values
 

@@ -36,14 +36,14 @@ FAULTS = {"crash": crash, "hang": hang, "grow": grow}
 render_well = images.Images.render
 
 
-def render(self: images.Images, view: View, path: Path) -> None:
+def render(self: images.Images, view: View, path: Path, *environment: object) -> None:
     once = os.environ.get("FAULT_ONCE")
     if view.pose[0] == float(os.environ["FAULT_YAW"]) and not (once and Path(once).exists()):
         if once:
             Path(once).touch()
         print("this is the faulty pose", file=sys.stderr, flush=True)
         FAULTS[os.environ["FAULT"]]()
-    render_well(self, view, path)
+    render_well(self, view, path, *environment)
 
 
 if "--version" in sys.argv:
