@@ -168,11 +168,11 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
         "plain": "0.0 None None () None",
         "full": "-1.3 cold (0.1, 2.0) ('a', 'b, c') /logo.png",
     }.items():
-        said = subprocess.run(
+        done = subprocess.run(
             [sys.executable, "-c", code, str(tmp_path / f"{name}.toml")],
-            check=True, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(tree)},
-        ).stdout  # fmt: skip
-        assert said.strip() == values
+            capture_output=True, text=True, cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)},
+        )  # fmt: skip
+        assert done.stdout.strip() == values, done.stderr
 
 
 @pytest.mark.skipif(not OTHERS, reason="`make test-bpy` runs the oldest and the newest bpy wheel")
