@@ -167,6 +167,30 @@ def test_what_is_left_out_of_a_mesh_moves_no_anchor(shared: SharedAnchors) -> No
     )
 
 
+def test_what_is_left_out_before_a_face_moves_its_triangles(shared: SharedAnchors) -> None:
+    """Anchors of a mesh as read count a stray triangle that stands first; those of its head do not."""
+    mesh = face_mesh()
+    stray = mesh.vertices.max(axis=0) * 20 + np.array([[0, 0, 0], [5, 0, 0], [0, 5, 0]])
+    triangles = np.concatenate([[[468, 469, 470]], mesh.triangles]).astype(np.int32)
+    index = np.zeros(len(triangles), np.int32)
+    first = replace(
+        mesh,
+        vertices=np.concatenate([mesh.vertices, stray]),
+        triangles=triangles,
+        material_index=index,
+    )
+    as_read = replace(
+        shared,
+        mesh=mesh_key(triangles),
+        count=len(triangles),
+        anchors=replace(shared.anchors, triangles=shared.anchors.triangles + 1),
+    )
+    placement = stand_known(HEAD, first, as_read, FACE_MESH)
+    found = anchors_on(first, placement, as_read)
+    np.testing.assert_array_equal(found.triangles, shared.anchors.triangles)
+    assert not found.absent
+
+
 def test_a_head_that_was_not_aligned_with_the_others_is_levelled_by_itself(shared: SharedAnchors) -> None:
     usual = np.reshape(shared.correction, (3, 3))
     points = shared.anchors.points

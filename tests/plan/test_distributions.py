@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from generator.cli.options import values_of
 from generator.errors import UsageError
+from generator.geometry.camera import framing_distance, framing_lens
 from generator.plan.config import BuildConfig, config_toml, load_config, read_recorded
 from generator.plan.distribution import Distribution, is_distribution, parse_distribution
 from generator.plan.settings import all_settings
@@ -138,6 +139,13 @@ def test_with_zoom_a_head_fits_at_any_distance() -> None:
         assert 400 <= camera.distance_mm <= 8000
     with pytest.raises(UsageError, match=r"stands inside a head of 126 mm; give a larger --distance"):
         plan_views(config(distance_mm=120, zoom=True), "amy/neutral", 120.0, POSES)
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_the_lens_that_fits_is_the_inverse_of_the_distance_that_does(projection: Any) -> None:
+    for distance in (400.0, 1234.5, 9000.0):
+        lens = framing_lens(120.0, distance, 1.3, projection)
+        assert framing_distance(120.0, lens, 1.3, projection) == pytest.approx(distance, rel=1e-12)
 
 
 @pytest.mark.parametrize("aspect", [1.5, 0.6])

@@ -35,7 +35,7 @@ from generator.heads.made import (
 from generator.heads.obj_write import write_obj
 from generator.heads.parametric.appearance import sample_appearance
 from generator.heads.parametric.curtain import paint_curtain
-from generator.heads.parametric.expression import NEUTRAL_EXPRESSION, sample_expression
+from generator.heads.parametric.expression import expressions_of
 from generator.heads.parametric.eyes import paint_eye
 from generator.heads.parametric.folder import write_texture
 from generator.heads.parametric.identity import sample_identity
@@ -115,11 +115,7 @@ def _fill(work: Path, subject: str, place: Path, seed: int, index: int, expressi
     paint = np.random.default_rng([seed, index, 3])
     long_hair = shape.curtain is not None
     described = {}
-    for number in range(expressions + 1):
-        name, expression = NEUTRAL, NEUTRAL_EXPRESSION
-        if number:
-            name = expression_name(number)
-            expression = sample_expression(np.random.default_rng([seed, index, 4, number]))
+    for name, expression in expressions_of(seed, index, expressions):
         vertices = head_vertices(kit, surface, shape, expression)
         write_obj(work / f"{name}.obj", MATERIAL_FILE, vertices, topology(surface, long_hair))
         modes = expression_modes(expression)

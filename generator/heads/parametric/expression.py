@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from generator.heads.head import NEUTRAL
+from generator.heads.made import expression_name
 from generator.heads.parametric.identity import ETHNICITIES, Identity
 
 GAZE_LIMIT = (25.0, 14.0)
@@ -119,6 +122,13 @@ def sample_expression(rng: np.random.Generator) -> Expression:
         if angle > 0:
             units[f"eyeLook{name}"] = angle / _UNIT_GAZE
     return Expression(mouth, brows, lids, units, right, up)
+
+
+def expressions_of(seed: int, index: int, sampled: int) -> Iterator[tuple[str, Expression]]:
+    """The neutral face of head ``index`` of a seed, and so many that are sampled, each with its name."""
+    yield NEUTRAL, NEUTRAL_EXPRESSION
+    for number in range(1, sampled + 1):
+        yield expression_name(number), sample_expression(np.random.default_rng([seed, index, 4, number]))
 
 
 def expression_targets(expression: Expression, identity: Identity) -> dict[str, float]:

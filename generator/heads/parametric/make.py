@@ -25,7 +25,7 @@ from generator.heads.parametric.appearance import Appearance, hair_tone, sample_
 from generator.heads.parametric.atlas import head_atlas
 from generator.heads.parametric.compose import HeadShape, head_shape, head_vertices
 from generator.heads.parametric.curtain import paint_curtain
-from generator.heads.parametric.expression import NEUTRAL_EXPRESSION, Expression, sample_expression
+from generator.heads.parametric.expression import Expression, expressions_of
 from generator.heads.parametric.eyes import paint_eye
 from generator.heads.parametric.folder import write_materials, write_mesh, write_texture
 from generator.heads.parametric.identity import Identity, sample_identity
@@ -116,11 +116,7 @@ def _fill(work: Path, subject: str, seed: int, index: int, expressions: int) -> 
     paint = np.random.default_rng([seed, index, 3])
     long_hair = shape.curtain is not None
     described = {}
-    for number in range(expressions + 1):
-        name, expression = NEUTRAL, NEUTRAL_EXPRESSION
-        if number:
-            name = expression_name(number)
-            expression = sample_expression(np.random.default_rng([seed, index, 4, number]))
+    for name, expression in expressions_of(seed, index, expressions):
         write_mesh(work / f"{name}.obj", head_vertices(shape, expression), long_hair)
         described[name] = _describe_expression(f"{name}.obj", expression)
     write_materials(work, np.minimum(hair_tone(appearance) * 0.6, 0.12), long_hair)

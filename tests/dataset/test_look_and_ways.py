@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What rows say of their look, and heads of where their anchors come from, is held against something else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from test_verify import PART, failures, rewrite
+
+from generator.dataset.format.anchors_table import HeadAnchors
+from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.part import read_part
+from generator.dataset.proof.exact_checks import levelling_problems
+from generator.dataset.proof.verify import verify_dataset
+from generator.landmarks.shared import packaged
+from generator.landmarks.topology import FACE_MESH
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [("look_ambient", 0.9), ("look_ambient", NAN), ("look_backdrop", "")]
+)
+def test_a_look_that_was_not_planned_is_found(dataset: Path, column: str, value: object) -> None:
+    """Also where a single row says nothing, as all of an older part may."""
+    said = read_part(dataset / PART)[column].to_pylist()
+    rewrite(dataset, {column: [value, *said[1:]]}, honest=True)
+    assert f"{column} is not what the configuration plans" in failures(verify_dataset(dataset))["look"]
+
+
+def test_a_part_that_is_older_than_looks_says_nothing_of_them(dataset: Path) -> None:
+    count = len(read_part(dataset / PART))
+    rewrite(dataset, {"look_ambient": [NAN] * count, "look_backdrop": [""] * count}, honest=True)
+    assert "look" not in failures(verify_dataset(dataset))
+
+
+def test_anchors_that_are_not_the_package_s_do_not_pass_for_them(dataset: Path) -> None:
+    [ours] = packaged(FACE_MESH)
+    head = replace(
+        read_heads(dataset)[0],
+        anchor_way="package",
+        correction=ours.correction,
+        correction_sd_deg=ours.correction_sd_deg,
+    )
+    name = head.subject, head.expression
+
+    def problems(weights: object) -> list[str]:
+        anchors = HeadAnchors(*name, ours.anchors.triangles, weights, ours.anchors.points)
+        return list(levelling_problems([head], {name: anchors}, FACE_MESH))
+
+    assert problems(ours.anchors.weights) == []
+    [said] = problems(ours.anchors.weights[:, [1, 0, 2]])
+    assert said == f"anchors.parquet: {'/'.join(name)}: not the anchors of the package"
