@@ -72,6 +72,23 @@ HEAD_MAKERS: Registry[Any] = Registry(
 MAKERS_OF_FOLDERS = frozenset({"ict"})
 """Makers whose ARGUMENT is a path, which counts from where the other paths of a configuration do."""
 
+WORN: Registry[Any] = Registry(
+    "worn",
+    {
+        "hair": "generator.worn.hair:KIND",
+        "brows": "generator.worn.brows:KIND",
+        "beard": "generator.worn.beard:KIND",
+        "glasses": "generator.worn.glasses:KIND",
+        "headwear": "generator.worn.headwear:KIND",
+        "headphones": "generator.worn.headphones:KIND",
+        "mask": "generator.worn.mask:KIND",
+        "clothes": "generator.worn.clothes:KIND",
+        "occluder": "generator.worn.occluder:KIND",
+    },
+)
+"""What a head may wear: a :class:`generator.worn.fit.Kind` by the setting that says its style, see
+:mod:`generator.plan.wear`."""
+
 DRAWS: Registry[Any] = Registry("draw", {})
 """What differs from image to image besides the pose: a :data:`generator.plan.view_plan.Draw` by the name of
 what it draws. Its generator depends on seed, head, pose and that name alone. There is none yet."""

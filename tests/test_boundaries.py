@@ -23,6 +23,7 @@ MAY_IMPORT = {
     "landmarks": {"plan", "heads", "geometry"},
     "dataset": {"landmarks", "plan", "heads", "geometry"},
     "placing": {"landmarks", "plan", "heads", "geometry"},
+    "worn": {"landmarks", "plan", "heads", "geometry"},
 }
 MAY_IMPORT["execution"] = {*MAY_IMPORT}
 MAY_IMPORT["cli"] = {*MAY_IMPORT}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError
+from generator.heads.labels import SKIN
 from generator.heads.tiling import EXTEND
 
 
@@ -22,6 +23,9 @@ class Material:
     tint: linear factors of the texture. vertex_tint: vertex colours are factors
     of the texture, too. wrap: how the texture goes on beyond 0-1, see
     :mod:`generator.heads.tiling`.
+    label: what it is, of :data:`generator.heads.labels.LABELS`.
+    gloss: 0 is matt, 1 reflects as glass or a wet eye does. opacity: share of what is behind that it hides,
+    such as a lens of glasses.
     """
 
     name: str
@@ -31,6 +35,9 @@ class Material:
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     vertex_tint: bool = False
     wrap: str = EXTEND
+    label: str = SKIN
+    gloss: float = 0.0
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True)

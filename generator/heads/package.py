@@ -26,6 +26,9 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
             "tint": list(m.tint),
             "vertex_tint": m.vertex_tint,
             "wrap": m.wrap,
+            "label": m.label,
+            "gloss": m.gloss,
+            "opacity": m.opacity,
         }
         for m in mesh.materials
     ]
@@ -45,7 +48,7 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
 def load_package(path: Path) -> HeadMesh:
     """The inverse of :func:`save_package`. Never unpickles.
 
-    Packages of earlier releases say nothing of tints and wrap, and knew neither.
+    Packages of earlier releases say nothing of tints, wrap and what comes behind it, and knew none of them.
     """
     with np.load(path, allow_pickle=False) as data:
         materials = tuple(
@@ -57,6 +60,9 @@ def load_package(path: Path) -> HeadMesh:
                 tuple(m.get("tint", Material.tint)),
                 m.get("vertex_tint", Material.vertex_tint),
                 m.get("wrap", Material.wrap),
+                m.get("label", Material.label),
+                m.get("gloss", Material.gloss),
+                m.get("opacity", Material.opacity),
             )
             for m in json.loads(str(data["materials"]))
         )

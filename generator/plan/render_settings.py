@@ -8,6 +8,7 @@ from typing import Literal
 
 from generator.plan.setting import Choice, setting
 from generator.plan.variety import CHOICES, NONE
+from generator.plan.wear import Wear
 
 PRESET_SAMPLES = {"fast": 1, "quality": 4}
 """Cycles samples a pixel of each preset, where none are asked for."""
@@ -123,7 +124,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Look(Sensor):
+class Look(Wear, Sensor):
     """What an image looks like, besides head, pose and camera. Of one image: part of a View."""
 
     preset: str = setting(

@@ -41,6 +41,7 @@ class Info:
     path       of a file or folder; a relative one counts from the configuration file
     varies     it may be a distribution, of which each image or each head draws; see
                :mod:`generator.plan.distribution`. Of numbers and texts in the sections of a view
+    since      schema version of the column ``look_...`` that holds what was drawn
     """
 
     help: str
@@ -55,6 +56,7 @@ class Info:
     content: bool = True
     path: bool = False
     varies: bool = False
+    since: str = "1.2.0"
 
 
 def setting(default: T, help: str, **info: Any) -> T:

@@ -22,7 +22,7 @@ from generator.plan.settings import Look, section_settings
 if TYPE_CHECKING:
     from generator.dataset.format.unit_rows import UnitRows
 
-SCHEMA_VERSION = "1.2.0"
+SCHEMA_VERSION = "1.3.0"
 """A new column raises the middle number, and says so in its ``since``; readers of the old one go on."""
 
 ImageMode = Literal["none", "files", "embedded"]
@@ -166,7 +166,7 @@ def _look_column(name: str, key: str) -> Column:
         "look",
         lambda rows: rows.of_looks(lambda look: getattr(look, key)),
         Compare() if of_texts else Compare("floats"),
-        since="1.2.0",
+        since=known.info.since,
         default="" if of_texts else float("nan"),
     )
 

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a head wears, as settings of [render], and which styles there are of it. stdlib only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from generator.plan.setting import setting
+
+OWN, NOTHING = "own", "none"
+"""As the head has it; nothing."""
+
+STYLES: dict[str, tuple[str, ...]] = {
+    "hair": (OWN, "short"),
+    "brows": (OWN, "natural"),
+    "beard": (OWN, "full"),
+    "glasses": (NOTHING, "round"),
+    "headwear": (NOTHING, "cap"),
+    "headphones": (NOTHING, "over-ear"),
+    "mask": (NOTHING, "medical"),
+    "clothes": (NOTHING, "crew"),
+    "occluder": (NOTHING, "hand"),
+}
+"""Kind -> its styles, of which the first is the default and adds nothing."""
+
+
+def _kind(name: str, what: str, label: str) -> str:
+    first, *others = STYLES[name]
+    return setting(first, f"{what}: {first}, or {', '.join(others)}", label=label, varies=True, since="1.3.0")
+
+
+@dataclass(frozen=True)
+class Wear:
+    """What a head wears; see :mod:`generator.worn`."""
+
+    hair: str = _kind("hair", "Hair", "Hair")
+    brows: str = _kind("brows", "Brows", "Brows")
+    beard: str = _kind("beard", "Beard", "Beard")
+    glasses: str = _kind("glasses", "Glasses", "Glasses")
+    headwear: str = _kind("headwear", "What is on the head", "Headwear")
+    headphones: str = _kind("headphones", "Headphones", "Headphones")
+    mask: str = _kind("mask", "A mask over mouth and nose", "Mask")
+    clothes: str = _kind("clothes", "Shoulders, and what they wear", "Clothes")
+    occluder: str = _kind("occluder", "What is before the face", "Occluder")
+    occluder_x: float = setting(
+        0.0, "How far right of the nose it is, in widths of the face", low=-2, high=2, label="Occluder right",
+        varies=True, since="1.3.0",
+    )  # fmt: skip
+    occluder_y: float = setting(
+        0.0, "How far below the nose it is, in widths of the face", low=-2, high=2, label="Occluder down",
+        varies=True, since="1.3.0",
+    )  # fmt: skip
+    wear_variant: float = setting(
+        0.0, "Colours, patterns and sizes of what is worn: each number between 0 and 1 has its own",
+        low=0, high=1, label="Variant", varies=True, since="1.3.0",
+    )  # fmt: skip
