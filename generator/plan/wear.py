@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from generator.plan.setting import setting
 
+LENSES = ("clear", "tinted", "dark", "mirror")
+"""Of glasses."""
+
 OWN, NOTHING = "own", "none"
 """As the head has it; nothing."""
 
@@ -14,7 +17,7 @@ STYLES: dict[str, tuple[str, ...]] = {
     "hair": (OWN, "short"),
     "brows": (OWN, "natural"),
     "beard": (OWN, "full"),
-    "glasses": (NOTHING, "round"),
+    "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),
     "headwear": (NOTHING, "cap"),
     "headphones": (NOTHING, "over-ear"),
     "mask": (NOTHING, "medical"),
@@ -37,6 +40,9 @@ class Wear:
     brows: str = _kind("brows", "Brows", "Brows")
     beard: str = _kind("beard", "Beard", "Beard")
     glasses: str = _kind("glasses", "Glasses", "Glasses")
+    lenses: str = setting(
+        LENSES[0], f"Of glasses: {', '.join(LENSES)}", label="Lenses", varies=True, since="1.3.0"
+    )
     headwear: str = _kind("headwear", "What is on the head", "Headwear")
     headphones: str = _kind("headphones", "Headphones", "Headphones")
     mask: str = _kind("mask", "A mask over mouth and nose", "Mask")
