@@ -21,6 +21,7 @@ from generator.landmarks.shared import SharedAnchors
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
+from generator.plan.wear import Worn
 
 T = TypeVar("T")
 
@@ -34,6 +35,7 @@ class RenderOrder:
     package: of :func:`generator.heads.package.save_package`. out: a folder for the images.
     passes: render these instead of the picture, see :mod:`generator.plan.passes`.
     lights: of the environment of each view; none where no view has one.
+    worn: by the head in each view; none where it wears nothing in any.
     A view with a backdrop is rendered as .exr over nothing, linear with alpha, whatever the format.
     """
 
@@ -43,6 +45,7 @@ class RenderOrder:
     format: Literal["bmp", "exr"] = "bmp"
     passes: tuple[str, ...] = ()
     lights: tuple[EnvironmentLight | None, ...] = ()
+    worn: tuple[tuple[Worn, ...], ...] = ()
 
 
 @dataclass(frozen=True)

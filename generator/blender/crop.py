@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +39,16 @@ class Outline:
         points = vertices if len(vertices) <= EXACT else _cell_corners(vertices)
         self._points = points @ CAMERA_FROM_GRAPHICS
 
-    def box(self, ypr_deg: Sequence[float], camera: Camera) -> Box | None:
-        """The pixels the head can touch at a pose, None if there are none."""
+    def box(
+        self, ypr_deg: Sequence[float], camera: Camera, offset_mm: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> Box | None:
+        """The pixels the mesh can touch at a pose, None if there are none.
+
+        offset_mm: where it is moved before it turns, frame U.
+        """
         rotation = rotation_from_angles(np.asarray(ypr_deg, dtype=np.float64))
-        points = self._points @ rotation.T + camera.translation_mm
+        moved = self._points + np.asarray(offset_mm) @ CAMERA_FROM_GRAPHICS
+        points = moved @ rotation.T + camera.translation_mm
         size = (camera.width, camera.height)
         if points[:, 2].min() < 0.05 * camera.distance_mm:
             return 0, size[0], 0, size[1]  # part of it is beside the camera: there is no outline
@@ -52,6 +58,15 @@ class Outline:
         if low[0] >= high[0] or low[1] >= high[1]:
             return None
         return low[0], high[0], size[1] - high[1], size[1] - low[1]
+
+
+def around(boxes: Iterable[Box | None]) -> Box | None:
+    """The box that holds some boxes."""
+    there = [box for box in boxes if box is not None]
+    if not there:
+        return None
+    left, right, bottom, top = zip(*there, strict=True)
+    return min(left), max(right), min(bottom), max(top)
 
 
 class Backdrop:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,14 @@ import bpy
 
 from generator.blender import compat
 from generator.blender.clearing import clear
-from generator.blender.crop import Backdrop, Backdrops, Box, Outline
+from generator.blender.crop import Backdrop, Backdrops, Box, Outline, around
 from generator.blender.passes import render_passes
 from generator.blender.stage import Stage
 from generator.heads.mesh import HeadMesh
+from generator.heads.package import load_package
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.views import View
+from generator.plan.wear import Worn
 
 
 class Images:
@@ -29,22 +31,40 @@ class Images:
     def __init__(self, mesh: HeadMesh, *, threads: int = 0, backdrops: Backdrops | None = None) -> None:
         self._mesh, self._threads = mesh, threads
         self._outline = Outline(mesh.vertices)
+        self._worn: dict[str, HeadMesh] = {}
+        self._outlines: dict[str, Outline] = {}
         self._stage: Stage | None = None
         self._knows_uv = False
         self._empty: Any = None  # what an image without the head depends on, of the last view
         self._alike = 0  # views in a row for which that is the same
         self._backdrops = backdrops or Backdrops()
 
-    def render(self, view: View, path: Path, environment: EnvironmentLight | None = None) -> None:
+    def wear(self, packages: Iterable[str]) -> None:
+        """Have these things at hand, and no others. Raises OSError or ValueError: one cannot be read."""
+        wanted = dict.fromkeys(packages)
+        self._worn = {name: self._worn.get(name) or load_package(Path(name)) for name in wanted}
+        self._outlines = {
+            name: self._outlines.get(name) or Outline(mesh.vertices) for name, mesh in self._worn.items()
+        }
+        if self._stage is not None:
+            self._stage.hang(self._worn)
+
+    def render(
+        self,
+        view: View,
+        path: Path,
+        environment: EnvironmentLight | None = None,
+        worn: Sequence[Worn] = (),
+    ) -> None:
         """Render a view into path: .bmp (sRGB) or .exr (linear float32).
 
-        environment: lights it, where there is one.
+        environment: lights it, where there is one. worn: of what :meth:`wear` brought.
 
         Both are lossless and quick to write; what is kept of an image is encoded by
         the host, without the times and dates that Blender puts into a PNG. Of a
         .bmp only the pixels the head can cover are rendered: the same bytes in less time.
         """
-        stage = self._show(view, environment)
+        stage = self._show(view, environment, worn)
         self._knows_uv = False
         empty = (view.camera.width, view.camera.height, view.look.preset, view.look.background)
         self._alike = self._alike + 1 if empty == self._empty else 1
@@ -55,34 +75,47 @@ class Images:
             _render(path)
             return
         if backdrop is None:
-            stage.head.hide_render = True
+            for thing in stage.objects:
+                thing.hide_render = True
             _render(path)
-            stage.head.hide_render = False
+            for thing in stage.objects:
+                thing.hide_render = False
             backdrop = Backdrop(path)
             self._backdrops.keep(empty, backdrop)
-        box = self._outline.box(view.pose, view.camera)
+        box = self._box(view, worn)
         if box is not None:
             _render(path, box)
         backdrop.lay(path, box)
 
     def render_over_nothing(
-        self, view: View, path: Path, environment: EnvironmentLight | None = None
+        self,
+        view: View,
+        path: Path,
+        environment: EnvironmentLight | None = None,
+        worn: Sequence[Worn] = (),
     ) -> None:
         """Render the head alone into path, .exr: linear, half floats, multiplied by alpha."""
-        self._show(view, environment)
+        self._show(view, environment, worn)
         self._knows_uv = False
-        _render(path, self._outline.box(view.pose, view.camera), over_nothing=True)
+        _render(path, self._box(view, worn), over_nothing=True)
 
-    def render_passes(self, view: View, path: Path, passes: Sequence[str]) -> None:
+    def render_passes(self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
-        stage = self._show(view, None)
+        stage = self._show(view, None, worn)
         if "uv" in passes and not self._knows_uv:
             # Persistent data keeps the mesh as pictures need it, which is without its UV map.
-            stage.head.data.update_tag()
+            for thing in stage.objects:
+                thing.data.update_tag()
             self._knows_uv = True
-        render_passes(path, stage.head, passes)
+        render_passes(path, stage.head, stage.objects[1:], passes)
 
-    def _show(self, view: View, environment: EnvironmentLight | None) -> Stage:
+    def _box(self, view: View, worn: Sequence[Worn]) -> Box | None:
+        """The pixels that the head and what it wears can cover."""
+        boxes = [self._outline.box(view.pose, view.camera)]
+        boxes += [self._outlines[one.package].box(view.pose, view.camera, one.offset_mm) for one in worn]
+        return around(boxes)
+
+    def _show(self, view: View, environment: EnvironmentLight | None, worn: Sequence[Worn]) -> Stage:
         has_one = environment is not None
         if self._stage is None or not self._stage.fits(view.look, has_one):
             self._stage = None
@@ -90,7 +123,8 @@ class Images:
             self._stage = Stage(
                 bpy.context.scene, self._mesh, view.look, threads=self._threads, environment=has_one
             )
-        self._stage.show(view, environment)
+            self._stage.hang(self._worn)
+        self._stage.show(view, environment, worn)
         return self._stage
 
 

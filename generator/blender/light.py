@@ -22,6 +22,14 @@ SUN_DIAMETER = math.radians(25.0)
 class Light(Protocol):
     """The light of a stage."""
 
+    def add(self, materials: Sequence[bpy.types.Material]) -> None:
+        """Light these, too: the fast preset's compute their light."""
+        ...
+
+    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
+        """No longer."""
+        ...
+
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
         """Make it that of a look, and of an environment where there is one."""
         ...
@@ -42,10 +50,8 @@ def key_strengths(look: Look, environment: EnvironmentLight | None) -> tuple[flo
     return (look.environment_key, 0.0) if environment else (1.0 - look.ambient, look.ambient)
 
 
-def build_light(
-    scene: bpy.types.Scene, preset: str, materials: Sequence[bpy.types.Material], environment: bool
-) -> Light:
-    """World and light of a preset. materials: of the head, which compute the fast preset's light.
+def build_light(scene: bpy.types.Scene, preset: str, environment: bool) -> Light:
+    """World and light of a preset.
 
     environment: may it be that of a panorama? In the quality preset it then has to be.
     """
@@ -56,28 +62,34 @@ def build_light(
     world.cycles.sampling_method = "NONE"
     world.node_tree.nodes.clear()
     if preset == "fast":
-        return LightInMaterials(world, materials, environment)
+        return LightInMaterials(world, environment)
     return LightInScene(scene, world, environment)
 
 
 class LightInMaterials:
     """The fast preset: every material computes light from the normal."""
 
-    def __init__(
-        self, world: bpy.types.World, materials: Sequence[bpy.types.Material], environment: bool
-    ) -> None:
+    def __init__(self, world: bpy.types.World, environment: bool) -> None:
         tree = world.node_tree
         output = tree.nodes.new("ShaderNodeOutputWorld")
         self._background = tree.nodes.new("ShaderNodeBackground")
         tree.links.new(self._background.outputs[0], output.inputs["Surface"])
-        self._nodes = [material.node_tree.nodes for material in materials]
+        self._materials: list[bpy.types.Material] = []
         self._knows_environments = environment
+
+    def add(self, materials: Sequence[bpy.types.Material]) -> None:
+        """See :class:`Light`."""
+        self._materials += materials
+
+    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
+        """See :class:`Light`."""
+        self._materials = [material for material in self._materials if material not in materials]
 
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
         key, ambient = key_strengths(look, environment)
-        for nodes in self._nodes:
+        for nodes in (material.node_tree.nodes for material in self._materials):
             nodes[DIRECTION].inputs[1].default_value = key_direction(look)
             nodes[STRENGTH].inputs[1].default_value = key
             nodes[STRENGTH].inputs[2].default_value = ambient
@@ -110,6 +122,12 @@ class LightInScene:
         self._lamp.angle = SUN_DIAMETER
         self._key = bpy.data.objects.new("key", self._lamp)
         scene.collection.objects.link(self._key)
+
+    def add(self, materials: Sequence[bpy.types.Material]) -> None:
+        """Lamps light whatever is there."""
+
+    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
+        """Lamps light whatever is there."""
 
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
         """See :class:`Light`."""

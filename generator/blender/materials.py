@@ -43,6 +43,8 @@ def build_material(
         surface = _principled(tree, color)
     if material.cutout and alpha is not None:
         surface = _cut_out(tree, surface, alpha)
+    if material.opacity < 1:
+        surface = _cut_out(tree, surface, _value(tree, material.opacity))
     tree.links.new(surface, output.inputs["Surface"])
     return made
 
@@ -80,6 +82,12 @@ def _vertex_colors(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
 def _constant(tree: bpy.types.NodeTree, linear: tuple[float, float, float]) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeRGB")
     node.outputs[0].default_value = (*linear, 1.0)
+    return node.outputs[0]
+
+
+def _value(tree: bpy.types.NodeTree, number: float) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("ShaderNodeValue")
+    node.outputs[0].default_value = number
     return node.outputs[0]
 
 

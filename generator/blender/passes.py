@@ -13,13 +13,15 @@ from generator.blender import compat
 from generator.plan.passes import OBJECT_INDEX
 from generator.registries import PASSES
 
-HEAD_INDEX = 1
+HEAD_INDEX, WORN_INDEX = 1, 2
 
 CENTRE_ONLY = 0.01
 """Blender's narrowest pixel filter, in pixels: the one sample lies at the pixel's centre."""
 
 
-def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> None:
+def render_passes(
+    path: Path, head: bpy.types.Object, worn: Sequence[bpy.types.Object], passes: Sequence[str]
+) -> None:
     """Render passes of the scene as it stands into path, as Blender names them.
 
     Where there is no surface object_index is 0, so it is always among them. Raises UsageError
@@ -28,6 +30,8 @@ def render_passes(path: Path, head: bpy.types.Object, passes: Sequence[str]) -> 
     scene = bpy.context.scene
     render = scene.render
     head.pass_index = HEAD_INDEX
+    for thing in worn:
+        thing.pass_index = WORN_INDEX
     layer = scene.view_layers[0]
     switches = {PASSES.get(name).switch for name in PASSES}
     wanted = {OBJECT_INDEX.switch, *(PASSES.get(name).switch for name in passes)}

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -21,6 +21,7 @@ from generator.heads.mesh import HeadMesh
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 from generator.plan.views import View
+from generator.plan.wear import Worn
 
 METRES = 1e-3
 """Blender units (metres) in a millimetre."""
@@ -52,13 +53,11 @@ class Stage:
         self.scene = scene
         self._kind = _kind(look)
         self._knows_environments = environment
-        preset = look.preset
-        self.head = _build_head(mesh, preset, environment)
-        scene.collection.objects.link(self.head)
-        if preset == "fast":
-            # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
-            scene.collection.objects.link(_unseen_twin(self.head))
-        self._light: Light = build_light(scene, preset, list(self.head.data.materials), environment)
+        self._preset = look.preset
+        self.head = self._add("head", mesh)
+        self._worn: dict[str, bpy.types.Object] = {}
+        self._light: Light = build_light(scene, look.preset, environment)
+        self._light.add(list(self.head.data.materials))
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(self._camera)
         scene.camera = self._camera
@@ -77,17 +76,69 @@ class Stage:
             return False
         return _kind(look) == self._kind and (self._knows_environments or not environment)
 
-    def show(self, view: View, environment: EnvironmentLight | None = None) -> None:
-        """Set pose, camera and look. What stays as it was is not touched. ValueError if it does not fit."""
+    def show(
+        self, view: View, environment: EnvironmentLight | None = None, worn: Sequence[Worn] = ()
+    ) -> None:
+        """Set pose, camera, look and what is worn, which :meth:`hang` brought. What stays as it was is not
+        touched. ValueError if it does not fit."""
         if not self.fits(view.look, environment is not None):
             raise ValueError(f"a stage for {self._kind} cannot show {_kind(view.look)}")
         turn(self.head, view.pose)
+        offsets = {one.package: one.offset_mm for one in worn}
+        for package, thing in self._worn.items():
+            set_seen(thing, package in offsets)
+            if package in offsets:
+                moved = METRES * (np.array(offsets[package]) @ BLENDER_FROM_GRAPHICS.T)
+                thing.matrix_world = self.head.matrix_world @ Matrix.Translation(moved.tolist())
         if view.camera != self._seen_by:
             set_camera(self.scene, self._camera, view.camera)
             self._seen_by = view.camera
         if (view.look, environment) != self._lit:
             self._light.set(view.look, environment)
             self._lit = view.look, environment
+
+    def hang(self, worn: Mapping[str, HeadMesh]) -> None:
+        """Have these things at hand, by their package, and no others."""
+        for package in [*self._worn]:
+            if package not in worn:
+                self._remove(self._worn.pop(package))
+        for package, mesh in worn.items():
+            if package not in self._worn:
+                self._worn[package] = self._add("worn", mesh)
+                set_seen(self._worn[package], False)
+                self._light.add(list(self._worn[package].data.materials))
+                self._lit = None
+
+    @property
+    def objects(self) -> list[bpy.types.Object]:
+        """The head, and what it wears in some view."""
+        return [self.head, *self._worn.values()]
+
+    def _add(self, name: str, mesh: HeadMesh) -> bpy.types.Object:
+        made = _build_object(name, mesh, self._preset, self._knows_environments)
+        self.scene.collection.objects.link(made)
+        if self._preset == "fast":
+            # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
+            self.scene.collection.objects.link(_unseen_twin(made))
+        return made
+
+    def _remove(self, thing: bpy.types.Object) -> None:
+        mesh = thing.data
+        for user in [one for one in self.scene.objects if one.data == mesh]:
+            bpy.data.objects.remove(user)
+        materials = list(mesh.materials)
+        self._light.drop(materials)
+        bpy.data.meshes.remove(mesh)
+        for material in materials:
+            bpy.data.materials.remove(material)
+
+
+def set_seen(thing: bpy.types.Object, seen: bool) -> None:
+    """Let rays meet an object or not. Its geometry stays with the renderer, which hiding would cost."""
+    for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+        setattr(thing, f"visible_{ray}", seen)
+    # Visible to nothing at all it would be left out; nothing here scatters in a volume.
+    thing.visible_volume_scatter = True
 
 
 def _kind(look: Look) -> tuple[str, int]:
@@ -128,15 +179,12 @@ def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
     builds the ray-casting tree anew at every pose. With a second user it keeps the tree.
     """
     twin = bpy.data.objects.new("twin", head.data)
-    twin.visible_camera = twin.visible_diffuse = twin.visible_glossy = False
-    twin.visible_transmission = twin.visible_shadow = False
-    # Visible to nothing at all it would be left out; nothing here scatters in a volume.
-    twin.visible_volume_scatter = True
+    set_seen(twin, False)
     return twin
 
 
-def _build_head(mesh: HeadMesh, preset: str, environment: bool) -> bpy.types.Object:
-    made = bpy.data.meshes.new("head")
+def _build_object(name: str, mesh: HeadMesh, preset: str, environment: bool) -> bpy.types.Object:
+    made = bpy.data.meshes.new(name)
     faces = len(mesh.triangles)
     vertices = (mesh.vertices * METRES) @ BLENDER_FROM_GRAPHICS.T
     made.vertices.add(len(vertices))
@@ -165,7 +213,7 @@ def _build_head(mesh: HeadMesh, preset: str, environment: bool) -> bpy.types.Obj
                 environment=environment,
             )
         )
-    return bpy.data.objects.new("head", made)
+    return bpy.data.objects.new(name, made)
 
 
 def _set_render(scene: bpy.types.Scene, look: Look, threads: int) -> None:

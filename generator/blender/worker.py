@@ -102,16 +102,18 @@ class RenderWorker:
             self._images = Images(mesh, threads=self._threads, backdrops=self._backdrops)
             self._loaded = wanted
         assert self._images is not None
+        self._images.wear(one.package for worn in order.worn for one in worn)
         for place, view in enumerate(order.views):
             path = Path(order.out) / f"{place:06d}.{order.format}"
             environment = order.lights[place] if order.lights else None
+            worn = order.worn[place] if order.worn else ()
             if order.passes:
-                self._images.render_passes(view, path, order.passes)
+                self._images.render_passes(view, path, order.passes, worn)
             elif view.look.backdrop != PLAIN:
                 path = path.with_suffix(".exr")
-                self._images.render_over_nothing(view, path, environment)
+                self._images.render_over_nothing(view, path, environment, worn)
             else:
-                self._images.render(view, path, environment)
+                self._images.render(view, path, environment, worn)
             answer(Rendered(place, str(path)))
 
     def _convert(self, order: ConvertOrder) -> None:

@@ -12,6 +12,7 @@ from embreex.rtcore_scene import EmbreeScene
 from trimesh.triangles import closest_point, points_to_barycentric
 
 from generator.errors import HeadError
+from generator.geometry.camera import Camera
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
 from generator.heads.textures import alpha_channel
@@ -149,18 +150,35 @@ class Surface:
         seen = np.zeros((len(views), len(points)), dtype=bool)
         rotations = rotation_from_angles(views.angles_deg)
         for row, (view, rotation) in enumerate(zip(views, rotations, strict=True)):
-            camera = view.camera
-            posed = points[known] @ rotation.T + camera.translation_mm
-            pixels = camera.project(posed)
-            inside = camera.holds(pixels)
-            origins, directions = camera.rays(pixels)
-            depth = posed[:, 2]
-            # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).
-            hits = self.first_hits((origins - camera.translation_mm) @ rotation, directions @ rotation)
-            length = np.linalg.norm(directions, axis=1)
-            in_front = hits.distances < depth - TOLERANCE_MM / length
-            seen[row, known] = inside & ~in_front
+            pixels = view.camera.project(points[known] @ rotation.T + view.camera.translation_mm)
+            hidden = self.hides(points[known], rotation, view.camera)
+            seen[row, known] = view.camera.holds(pixels) & ~hidden
         return seen
+
+    def hides(
+        self,
+        points: np.ndarray,
+        rotation: np.ndarray,
+        camera: Camera,
+        *,
+        offset: np.ndarray | None = None,
+        nearer_mm: float = TOLERANCE_MM,
+    ) -> np.ndarray:
+        """Which points the surface keeps from a camera, bool [P].
+
+        points: float [P, 3], finite, frame C at pose zero, mm. rotation: R_C [3, 3], of both.
+        offset: of the surface, frame C at pose zero, mm. nearer_mm: by how much it has to be before them.
+        """
+        posed = points @ rotation.T + camera.translation_mm
+        origins, directions = camera.towards(posed)
+        # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).
+        start = (origins - camera.translation_mm) @ rotation
+        if offset is not None:
+            start = start - offset
+        hits = self.first_hits(start, directions @ rotation)
+        length = np.linalg.norm(directions, axis=1)
+        hidden: np.ndarray = hits.distances < posed[:, 2] - nearer_mm / length
+        return hidden
 
     def _weights(self, triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Barycentric weights of rays in the planes of triangles they are known to hit."""

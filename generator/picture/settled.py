@@ -17,17 +17,20 @@ from generator.errors import UsageError
 from generator.escape import quoted
 from generator.picture.files import PANORAMAS, PICTURES, named_files, packaged_panoramas, read_file
 from generator.plan.config import BuildConfig
-from generator.plan.distribution import Distribution, parse_choice
+from generator.plan.distribution import Distribution
 from generator.plan.render_settings import BACKDROPS, ENVIRONMENT, NOTHING, PICTURE
+from generator.plan.wear import STYLES
 
 ALL = "all"
 
 
 def settled(config: BuildConfig) -> BuildConfig:
-    """The configuration with every name that its environments, backdrops and pictures may have.
+    """The configuration with every name that its environments, backdrops, pictures and wear may have.
 
     Raises UsageError: there is no such name or folder, or a file cannot be read.
     """
+    for kind, styles in STYLES.items():
+        config = _styled(config, kind, styles)
     environments = _texts(config, "environment")
     backdrops = _texts(config, "backdrop")
     if unknown := [name for name in backdrops if name not in BACKDROPS]:
@@ -75,9 +78,8 @@ def _named(
     config: BuildConfig, key: str, files: dict[str, Path], digest: hashlib._Hash, others: Sequence[str]
 ) -> BuildConfig:
     """The configuration with the names of files for "all", or for nothing; the digest learns of each."""
-    drawn = config.drawn.get(f"render.{key}")
-    names = [name for text in _texts(config, key) for name in (files if text in (ALL, "") else (text,))]
-    for name in dict.fromkeys(names):
+    texts = _texts(config, key)
+    for name in dict.fromkeys(name for text in texts for name in (files if text in (ALL, "") else (text,))):
         if name in others:
             continue
         if name not in files:
@@ -85,12 +87,27 @@ def _named(
             raise UsageError(f"render.{key}: no {quoted(name)}; {_there_are(near)}")
         content = hashlib.sha256(read_file(files[name], f"render.{key}")).hexdigest()
         digest.update(f"{key} {name}\0{content}\n".encode())
+    return _chosen(config, key, texts, tuple(files))
+
+
+def _styled(config: BuildConfig, kind: str, styles: Sequence[str]) -> BuildConfig:
+    """The configuration with every style for "all"."""
+    texts = _texts(config, kind)
+    if unknown := [text for text in texts if text not in (*styles, ALL)]:
+        raise UsageError(f"render.{kind}: no {kind} {quoted(unknown[0])}; {_there_are(styles)}")
+    return _chosen(config, kind, texts, styles) if ALL in texts else config
+
+
+def _chosen(config: BuildConfig, key: str, texts: Sequence[str], every: Sequence[str]) -> BuildConfig:
+    """The configuration with a choice of texts, each of every for "all" or nothing."""
+    names = tuple(name for text in texts for name in (every if text in (ALL, "") else (text,)))
+    drawn = config.drawn.get(f"render.{key}")
     first: dict[str, Any] = {key: names[0]}
     render = replace(config.render, **first)
     if drawn is None and len(names) == 1:
         return replace(config, render=render)
-    choice = Distribution("choice", per_head=bool(drawn and drawn.per_head), texts=tuple(names))
-    return replace(config, render=render, drawn={**config.drawn, f"render.{key}": parse_choice(choice.text)})
+    choice = Distribution("choice", per_head=bool(drawn and drawn.per_head), texts=names)
+    return replace(config, render=render, drawn={**config.drawn, f"render.{key}": choice})
 
 
 def _there_are(names: Sequence[str]) -> str:

@@ -84,7 +84,7 @@ class Placer:
                     if anchors.way == "head" and anchors.views:
                         own.append(of_subject(mesh.triangles, _as_read(anchors, mesh, placement)))
                 else:
-                    anchors = self._anchor(mesh, placement, own)
+                    anchors = self.anchors(mesh, placement, own)
             except HeadError as error:
                 reason = reason or str(error)
                 facts.append(HeadFacts(error=str(error)))
@@ -140,7 +140,8 @@ class Placer:
             anchors, zero = anchor_head(mesh, found, self._renderer, self._detector, self._scratch)
         return level_head(head, replace(found, frame=frame), anchors, zero, self._topology), anchors
 
-    def _anchor(self, mesh: HeadMesh, placement: Placement, own: Sequence[SharedAnchors]) -> Anchors:
+    def anchors(self, mesh: HeadMesh, placement: Placement, own: Sequence[SharedAnchors] = ()) -> Anchors:
+        """The anchors of a head that stands. mesh: as read. own: of its subject's other heads."""
         known = find_known(mesh, (*self._shared, *own), self._topology)
         if known is not None:
             return anchors_on(mesh, placement, known)

@@ -60,3 +60,22 @@ class Wear:
         0.0, "Colours, patterns and sizes of what is worn: each number between 0 and 1 has its own",
         low=0, high=1, label="Variant", varies=True, since="1.3.0",
     )  # fmt: skip
+
+    @property
+    def wears(self) -> dict[str, str]:
+        """Kind -> style of what is not as the head has it."""
+        return {
+            kind: getattr(self, kind) for kind, styles in STYLES.items() if getattr(self, kind) != styles[0]
+        }
+
+
+@dataclass(frozen=True)
+class Worn:
+    """Something that a render worker shows with a head, turned as the head is.
+
+    package: of :func:`generator.heads.package.save_package`. offset_mm: where it is moved, frame U of the
+    head before it is turned.
+    """
+
+    package: str
+    offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)

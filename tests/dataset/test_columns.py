@@ -62,7 +62,15 @@ def test_every_check_of_rows_is_some_columns() -> None:
 
 
 def test_columns_of_a_version_are_those_of_its_time() -> None:
-    later = {"projection", "landmarks_exact", "landmarks_visible", "passes_path", "passes_sha256", *LOOKS}
+    later = {
+        "projection",
+        "landmarks_exact",
+        "landmarks_visible",
+        "passes_path",
+        "passes_sha256",
+        *LOOKS,
+        "look_left_out",
+    }
     assert {c.name for c in columns_at(ROWS, "1.0.0")} == set(ROWS) - later
     assert [c.name for c in columns_at(ROWS, "1.9.0")] == list(ROWS)
     assert [field.name for field in fields(HeadRow)] == heads_schema().names == list(HEADS)
@@ -193,8 +201,8 @@ def test_a_unit_without_its_values_is_refused(rows, monkeypatch: pytest.MonkeyPa
 
 def test_what_is_compared_and_how_it_is_said(rows) -> None:
     assert list(compared_columns()) == [
-        "rotation", "camera", "translation_mm", "projection", *LOOKS, "detected", "landmarks",
-        "landmarks_exact", "landmarks_visible", "width", "height", "image_sha256", "passes_sha256",
+        "rotation", "camera", "translation_mm", "projection", *LOOKS, "look_left_out", "detected",
+        "landmarks", "landmarks_exact", "landmarks_visible", "width", "height", "image_sha256", "passes_sha256",
     ]  # fmt: skip
     row = unit_table(rows, part_schema("none", {}, "")).to_pylist()[0]
     assert row_differences(row, row) == []

@@ -211,6 +211,8 @@ def _row_columns() -> tuple[Column, ...]:
                lambda rows: rows.of_cameras(lambda camera: camera.projection), same,
                since="1.1.0", default="perspective"),
         *(_look_column(name, key) for name, key in LOOKS.items()),
+        Column("look_left_out", text, "what of the look could not be made, and why; empty where all was",
+               "look", lambda rows: rows.looks_left_out, same, since="1.3.0", default=""),
         Column("detected", pa.bool_(), "did the detector find the face?", "landmarks",
                lambda rows: rows.detected, Compare(says="detected was {then}, is {now}")),
         Column("landmarks", PerPoint(pa.float32(), 3),

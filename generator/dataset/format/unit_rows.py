@@ -43,6 +43,7 @@ class UnitRows:
     passes         N multilayer OpenEXR files and the SHA-256 of their decoded floats; None
                    where no passes were asked for
     topology       what the P landmarks are
+    left_out       of each row, what its head could not wear and why; empty where nothing was
     extra          values of columns that have no ``fill`` of their own: name -> [N, ...]
     """
 
@@ -63,6 +64,7 @@ class UnitRows:
     image_suffix: str = ".png"
     passes: Sequence[tuple[bytes, str]] | None = None
     topology: Topology = FACE_MESH
+    left_out: Sequence[str] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -118,6 +120,11 @@ class UnitRows:
         """What value says of each row's look."""
         values = [value(look) for look in self.looks]
         return values if len(values) == len(self) else values * len(self)
+
+    @property
+    def looks_left_out(self) -> list[str]:
+        """What of each row's look could not be made; "" where all of it was."""
+        return [*self.left_out] or [""] * len(self)
 
     @property
     def image_paths(self) -> list[str]:

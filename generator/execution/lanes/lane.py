@@ -29,6 +29,7 @@ from generator.errors import HeadError, WorkerError
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.renderer import Renderer
 from generator.execution.lanes.shots import Shots
+from generator.geometry.rotation import graphics_rotation
 from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
@@ -54,6 +55,7 @@ from generator.placing.placer import Placer
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 from generator.process import resident_mib
+from generator.worn.wardrobe import Outfits, Wardrobe
 
 ENCODING = {
     # Run lengths alone: smaller than level 3 of the usual search on these images, and quicker.
@@ -82,6 +84,7 @@ class Lane:
             # Where a head stands is read off renders, and every Blender renders a little differently.
             # With the same one for this, labels do not depend on the one that renders the images.
             self._places = self._open_renderer("looks", options, None)
+        self._wardrobe = Wardrobe(self._scratch / "worn")
         self._detectors: dict[Landmarks, Detector] = {}
         self._loaded: tuple[Head, Placement] | None = None
 
@@ -137,6 +140,18 @@ class Lane:
             folder.mkdir()
         return read_mesh(head, folder, import_with_blender=self.renderer.import_mesh)
 
+    def dressed(
+        self, head: Head, mesh: HeadMesh, placement: Placement, views: Views, landmarks: Landmarks
+    ) -> Outfits:
+        """What a head that stands wears in some views, for a preview. mesh: as read."""
+        if not any(look.wears for look in views.looks):
+            return Outfits()
+        anchors = self.placer(landmarks).anchors(mesh, placement)
+        points = anchors.turned(graphics_rotation(placement.levelling))
+        return self._wardrobe.dress(
+            head.name, placement.normalise(head_alone(mesh, placement)), points, views
+        )
+
     def _open_renderer(self, folder: str, options: LaneOptions, blender: str | None) -> Renderer:
         images = self._scratch / folder
         images.mkdir(parents=True, exist_ok=True)
@@ -176,13 +191,15 @@ class Lane:
                     f"{order.head.mesh_path}: {off} of its anchors are not on its surface: what an earlier "
                     f"run noted about it was changed; delete {PLACED_FILE} and run the build again"
                 )
-            visible = self._surface.visible(order.anchors, views)
+            outfits = self._wardrobe.dress(order.head.name, self._mesh, order.anchors, views)
+            visible = self._surface.visible(order.anchors, views) & ~outfits.hidden(order.anchors, views)
         topology = detector.topology
         landmarks = np.full((len(views), topology.count, 3), np.nan, dtype=np.float32)
         detected = np.zeros(len(views), dtype=bool)
         suffix, flags = ENCODING[order.image_format]
         images: list[bytes] = []
-        rendered = self.shots.start(package, views, Folders(order.environments, order.pictures))
+        folders = Folders(order.environments, order.pictures)
+        rendered = self.shots.start(package, views, folders, outfits.worn)
         for row, view in enumerate(views):
             with _timed(seconds, "wait for render"):
                 path = next(rendered)
@@ -199,7 +216,7 @@ class Lane:
         passes = None
         if order.passes:
             with _timed(seconds, "passes"):
-                passes = list(self._passes(package, views, order.passes))
+                passes = list(self._passes(package, views, order.passes, outfits))
         rows = UnitRows(
             subject=order.head.subject,
             expression=order.head.expression,
@@ -214,6 +231,7 @@ class Lane:
             landmarks=landmarks,
             anchors=order.anchors,
             visible=visible,
+            left_out=outfits.left_out,
             images=images,
             image_suffix=suffix,
             passes=passes,
@@ -227,11 +245,15 @@ class Lane:
             part = commit_unit(rows, schema, Path(order.root), order.unit)
         return Built(part, seconds, versions)
 
-    def _passes(self, package: Path, views: Views, names: tuple[str, ...]) -> Iterator[tuple[bytes, str]]:
+    def _passes(
+        self, package: Path, views: Views, names: tuple[str, ...], outfits: Outfits
+    ) -> Iterator[tuple[bytes, str]]:
         """Each view's passes as (OpenEXR file, SHA-256 of its floats), rendered a few at a time."""
         for start in range(0, len(views), PASSES_AHEAD):
-            some = views[start : start + PASSES_AHEAD]
-            for view, path in zip(some, self.renderer.render(package, some, passes=names), strict=True):
+            few = slice(start, start + PASSES_AHEAD)
+            some = views[few]
+            rendered = self.renderer.render(package, some, passes=names, worn=outfits.worn[few])
+            for view, path in zip(some, rendered, strict=True):
                 channels = passes_from_blender(path, names, view.camera.distance_mm)
                 write_passes(channels, path)
                 yield path.read_bytes(), passes_sha256(channels)
@@ -243,7 +265,7 @@ class Lane:
             self._loaded = None
             mesh = placement.normalise(head_alone(self.read(head), placement))
             save_package(mesh, package)
-            self._surface = Surface(mesh)
+            self._mesh, self._surface = mesh, Surface(mesh)
             self._loaded = head, placement
         return package
 

@@ -29,6 +29,7 @@ from generator.messages import (
 )
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.views import Views
+from generator.plan.wear import Worn
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 
@@ -116,18 +117,19 @@ class Renderer:
         kind: Literal["bmp", "exr"] = "bmp",
         passes: Sequence[str] = (),
         lights: tuple[EnvironmentLight | None, ...] = (),
+        worn: tuple[tuple[Worn, ...], ...] = (),
     ) -> Iterator[Path]:
         """Render views of a packaged head.
 
         kind: .bmp (sRGB) or .exr (linear float32).
         passes: render these, as .exr, instead of the picture; see generator.blender.passes.
-        lights: see :class:`generator.messages.RenderOrder`.
+        lights, worn: see :class:`generator.messages.RenderOrder`.
 
         Yields the path of each image as soon as it is written; the caller removes it.
         Raises HeadError if Blender cannot load the head, WorkerError if the worker dies.
         """
         kind = "exr" if passes else kind
-        self._send(RenderOrder(str(package), views, str(self.images), kind, tuple(passes), lights))
+        self._send(RenderOrder(str(package), views, str(self.images), kind, tuple(passes), lights, worn))
         receipts = self._receipts()
         try:
             for receipt in receipts:

@@ -14,6 +14,7 @@ from generator.picture.develop import developed
 from generator.picture.scenery import Folders, Scenery
 from generator.placing.rendering import read_image
 from generator.plan.views import View, Views
+from generator.plan.wear import Worn
 
 
 class Shots:
@@ -24,12 +25,14 @@ class Shots:
         self._folders = Folders()
         self._scenery = Scenery(self._folders)
 
-    def start(self, package: Path, views: Views, folders: Folders) -> Iterator[Path]:
+    def start(
+        self, package: Path, views: Views, folders: Folders, worn: tuple[tuple[Worn, ...], ...] = ()
+    ) -> Iterator[Path]:
         """The file of each view, for :meth:`finish`. Raises HeadError, also for an environment that is not
         there; otherwise as :meth:`Renderer.render`."""
         if folders != self._folders:
             self._folders, self._scenery = folders, Scenery(folders)
-        return self._renderer.render(package, views, lights=self._scenery.lights(views))
+        return self._renderer.render(package, views, lights=self._scenery.lights(views), worn=worn)
 
     def finish(self, path: Path, view: View) -> np.ndarray:
         """The picture that a file becomes, uint8 [H, W, 3], RGB; the file is removed.
@@ -44,9 +47,11 @@ class Shots:
             raise WorkerError(f"{path}: the render worker left an image of another size")
         return developed(image, view.look, view.seed)
 
-    def take(self, package: Path, views: Views, folders: Folders) -> Iterator[np.ndarray]:
+    def take(
+        self, package: Path, views: Views, folders: Folders, worn: tuple[tuple[Worn, ...], ...] = ()
+    ) -> Iterator[np.ndarray]:
         """The pictures of some views, one after another."""
-        for view, path in zip(views, self.start(package, views, folders), strict=True):
+        for view, path in zip(views, self.start(package, views, folders, worn), strict=True):
             yield self.finish(path, view)
 
 

@@ -71,7 +71,8 @@ def render_preview(
             package = scratch / "preview.npz"
             save_package(placement.normalise(head_alone(mesh, placement)), package)
             views = plan_views(config, head.name, placement.radius_mm, [pose])
-            [image] = lane.shots.take(package, views, folders_of(config))
+            outfits = lane.dressed(head, mesh, placement, views, config.landmarks)
+            [image] = lane.shots.take(package, views, folders_of(config), outfits.worn)
             found = lane.detector(config.landmarks).detect(image)
         finally:
             lane.close()
@@ -83,7 +84,9 @@ def render_preview(
     except OSError as error:
         raise DatasetError(f"{picture}: cannot be written ({error.strerror})") from error
     left_out = (f"skipped {skip.subject}/{skip.expression}: {skip.reason}" for skip in source.skipped)
-    notes = "; ".join(dict.fromkeys((*head.problems, *mesh.problems, *placement.notes, *left_out)))
+    notes = "; ".join(
+        dict.fromkeys((*head.problems, *mesh.problems, *placement.notes, *outfits.left_out, *left_out))
+    )
     return ("landmarks found" if found is not None else "no face was found at this pose") + (
         f" ({notes})" if notes else ""
     )

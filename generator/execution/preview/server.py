@@ -55,6 +55,7 @@ from generator.plan.pose_plans import plan_poses
 from generator.plan.settings import Values
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Pose, Views
+from generator.plan.wear import Worn
 
 
 class _Quiet:
@@ -132,7 +133,8 @@ class PreviewServer:
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths, found, tiles = [], [], []
-        for index, image in enumerate(self._render(Path(package), views, config)):
+        worn = self._worn(config, head, views)
+        for index, image in enumerate(self._render(Path(package), views, config, worn)):
             detector = self._open_lane().detector(config.landmarks) if landmarks else None
             points = detector.detect(image) if detector else None
             found.append(None if points is None else np.round(points[:, :2], 2).tolist())
@@ -198,8 +200,18 @@ class PreviewServer:
         save_package(placement.normalise(head_alone(mesh, placement)), target)
         return mesh.problems, len(mesh.vertices)
 
-    def _render(self, package: Path, views: Views, config: BuildConfig) -> Iterator[np.ndarray]:
-        return self._open_lane().shots.take(package, views, folders_of(config))
+    def _worn(self, config: BuildConfig, name: str, views: Views) -> tuple[tuple[Worn, ...], ...]:
+        """What a head wears in some views."""
+        if not any(look.wears for look in views.looks):
+            return ()
+        head = self._head(*name.split("/"))
+        placement, lane = self._placement(config, head.subject), self._open_lane()
+        return lane.dressed(head, lane.read(head), placement, views, config.landmarks).worn
+
+    def _render(
+        self, package: Path, views: Views, config: BuildConfig, worn: tuple[tuple[Worn, ...], ...] = ()
+    ) -> Iterator[np.ndarray]:
+        return self._open_lane().shots.take(package, views, folders_of(config), worn)
 
     def _open_lane(self) -> Lane:
         if self._lane is None:
