@@ -202,7 +202,8 @@ def test_a_unit_without_its_values_is_refused(rows, monkeypatch: pytest.MonkeyPa
 def test_what_is_compared_and_how_it_is_said(rows) -> None:
     assert list(compared_columns()) == [
         "rotation", "camera", "translation_mm", "projection", *LOOKS, "look_left_out", "detected",
-        "landmarks", "landmarks_exact", "landmarks_visible", "width", "height", "image_sha256", "passes_sha256",
+        "landmarks", "landmarks_exact", "landmarks_visible", "width", "height", "image_sha256",
+        "passes_sha256",
     ]  # fmt: skip
     row = unit_table(rows, part_schema("none", {}, "")).to_pylist()[0]
     assert row_differences(row, row) == []
