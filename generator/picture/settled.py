@@ -19,7 +19,7 @@ from generator.picture.files import PANORAMAS, PICTURES, named_files, packaged_p
 from generator.plan.config import BuildConfig
 from generator.plan.distribution import Distribution
 from generator.plan.render_settings import BACKDROPS, ENVIRONMENT, NOTHING, PICTURE
-from generator.plan.wear import STYLES
+from generator.plan.wear import LENSES, STYLES
 
 ALL = "all"
 
@@ -29,7 +29,7 @@ def settled(config: BuildConfig) -> BuildConfig:
 
     Raises UsageError: there is no such name or folder, or a file cannot be read.
     """
-    for kind, styles in STYLES.items():
+    for kind, styles in {**STYLES, "lenses": LENSES}.items():
         config = _styled(config, kind, styles)
     environments = _texts(config, "environment")
     backdrops = _texts(config, "backdrop")

@@ -20,7 +20,7 @@ STYLES: dict[str, tuple[str, ...]] = {
     "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),
     "headwear": (NOTHING, "cap"),
     "headphones": (NOTHING, "over-ear"),
-    "mask": (NOTHING, "medical"),
+    "mask": (NOTHING, "medical", "cloth", "ffp2"),
     "clothes": (NOTHING, "crew"),
     "occluder": (NOTHING, "hand"),
 }

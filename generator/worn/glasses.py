@@ -7,6 +7,7 @@ import numpy as np
 
 from generator.heads.labels import GLASSES
 from generator.heads.mesh import HeadMesh, Material
+from generator.plan.wear import NOTHING
 from generator.worn.colours import ACETATE, METAL, Colour, drawn, luminance, mottled
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear, Fit, Kind
@@ -27,6 +28,8 @@ FREE_MM = 1.2
 """Between frame and face."""
 
 LENS_FREE_MM = 2.0
+
+OVER_MASK_MM = 3.0
 
 GAPS_MM = (16.0, 18.0, 20.0, 22.0, 24.0, 26.0)
 """Widths of a bridge, of which the one is chosen that sits best."""
@@ -54,7 +57,8 @@ _LENSES: dict[str, tuple[dict[Colour, float], float]] = {
 def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     """See :data:`generator.worn.fit.Make`."""
     face, frame = Face.of(fit), FRAMES[style]
-    front, outline = seat(face, frame, float(rng.uniform(0.97, 1.05)))
+    over = OVER_MASK_MM if fit.others.get("mask", NOTHING) != NOTHING else 0.0
+    front, outline = seat(face, frame, float(rng.uniform(0.97, 1.05)), over)
     metal, plastic = drawn(METAL, rng), drawn(ACETATE, rng)
     wire = Material("frame metal", metal, label=GLASSES, gloss=0.75)
     acetate = Material("frame", plastic, label=GLASSES, gloss=0.5)
@@ -92,9 +96,10 @@ def _tortoise(part: Part, seed: int) -> Part:
     return Part(part.shape, colours, part.material)
 
 
-def seat(face: Face, frame: Frame, size: float) -> tuple[Front, np.ndarray]:
+def seat(face: Face, frame: Frame, size: float, over: float = 0.0) -> tuple[Front, np.ndarray]:
     """Where a frame's front stands, and the outline of its lens at image right about the front's middle.
 
+    over: mm that it stands farther from the face, such as over a mask.
     The bridge is chosen that lets the lenses stand nearest to the eyes. Raises CannotWear where even so they
     are too far.
     """
@@ -113,9 +118,10 @@ def seat(face: Face, frame: Frame, size: float) -> tuple[Front, np.ndarray]:
         centre = apart / 2 + (2.0 + frame.widen_mm / 2) * face.scale + 0.25 * (gap - GAPS_MM[0])
         shape = frame.points(2 * centre * size - gap)
         low = shape[:, 1].min()
-        outline = shape + [gap / 2 - shape[:, 0].min(), -0.08 * (shape[:, 1].max() - low)]
+        outline = shape + np.array([gap / 2 - shape[:, 0].min(), -0.08 * (shape[:, 1].max() - low)])
         front = Front(middle)
-        needed = max(_needed(face, front, outline, frame), eyes.max() + VERTEX_MM)
+        behind = front.at(outline.mean(axis=0))[2]
+        needed = max(_needed(face, front, outline, frame) + over, eyes.max() + VERTEX_MM - behind)
         cost = needed + 0.25 * abs(gap - 18.0)
         if best is None or cost < best[0]:
             best = cost, needed, outline
@@ -123,7 +129,7 @@ def seat(face: Face, frame: Frame, size: float) -> tuple[Front, np.ndarray]:
     _, depth, outline = best
     if depth - eyes.max() > MOST_VERTEX_MM:
         raise CannotWear(f"glasses would stand {depth - eyes.max():.0f} mm before the eyes")
-    return Front(middle + [0, 0, depth]), outline
+    return Front(middle + np.array([0, 0, depth])), outline
 
 
 def _needed(face: Face, front: Front, outline: np.ndarray, frame: Frame) -> float:
@@ -138,4 +144,4 @@ def _needed(face: Face, front: Front, outline: np.ndarray, frame: Frame) -> floa
     return float(np.nanmax(face.front(points[..., 0], points[..., 1]) - points[..., 2] + room))
 
 
-KIND = Kind(make, minds=("lenses",))
+KIND = Kind(make, minds=("lenses", "mask"))

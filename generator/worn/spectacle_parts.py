@@ -117,13 +117,8 @@ def pads(face: Face, front: Front, outline: np.ndarray, side: int, frame: Frame)
     centre = hit + 1.1 * out
     made = [ball(centre, np.array([1.0, 5.6, 3.0]), axes, 10)]
     if frame.metal:
-        made.append(
-            limb(
-                curve([rim_point, (rim_point + centre) / 2 + [side * 0.8, 2, -1.6], centre + 0.4 * out], 6),
-                0.5,
-                6,
-            )
-        )
+        between = (rim_point + centre) / 2 + np.array([side * 0.8, 2, -1.6])
+        made.append(limb(curve(np.stack([rim_point, between, centre + 0.4 * out]), 6), 0.5, 6))
     return made
 
 
@@ -153,7 +148,7 @@ def temple(face: Face, front: Front, outline: np.ndarray, side: int, frame: Fram
     hook = np.stack([np.maximum(skull.at(drop, depth), 35.0) + 1.2, drop, depth], axis=1)
     hook[:, 0] = np.minimum(hook[:, 0], over[0] + 1.0)
     rest = np.vstack([straight, hook]) * [side, 1, 1]
-    stub = begin + [side * 1.2, 0, -0.4]
+    stub = begin + np.array([side * 1.2, 0, -0.4])
     path = np.vstack([begin, stub, curve(rest, 26)])
     tall = np.interp(np.linspace(0, 1, len(path)), [0, 0.15, 0.7, 1], [1.0, 1.0, 0.75, 0.9])
     tall = tall * (2.2 if frame.metal and not frame.brow else 5.2)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Glasses, masks, hats, headphones and occluders: on heads of three sources, where they belong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from where import SOURCES, behind_front_mm, covers, of_material
+
+from generator.heads.labels import GLASSES, MASK
+from generator.heads.mesh import HeadMesh
+from generator.plan.wear import LENSES, STYLES
+from generator.registries import WORN
+from generator.worn.face import Face
+from generator.worn.fit import CannotWear, Fit
+
+LABELS = {"glasses": GLASSES, "mask": MASK}
+THINGS = [(kind, style) for kind in LABELS for style in STYLES[kind][1:]]
+MOST_TRIANGLES = 6000
+
+
+def make(fit: Fit, kind: str, style: str, seed: int = 3, **others: str) -> HeadMesh:
+    """A thing on a head."""
+    return WORN.get(kind).make(replace(fit, others=others), style, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize(("kind", "style"), THINGS)
+def test_every_style_is_made_on_every_head(fits: dict[str, Fit], kind: str, style: str) -> None:
+    for fit in fits.values():
+        made = make(fit, kind, style)
+        assert np.isfinite(made.vertices).all() and len(made.triangles) <= MOST_TRIANGLES
+        assert {material.label for material in made.materials} == {LABELS[kind]}
+        assert (
+            made.vertex_colors is not None and 0 <= made.vertex_colors.min() <= made.vertex_colors.max() <= 1
+        )
+        corners = made.vertices[made.triangles]
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        assert (area > 1e-9).mean() > 0.95
+        again = make(fit, kind, style)
+        assert (again.vertices == made.vertices).all() and (again.triangles == made.triangles).all()
+        other = make(fit, kind, style, seed=4)
+        assert (
+            other.vertex_colors.shape != made.vertex_colors.shape
+            or (other.vertex_colors != made.vertex_colors).any()
+        )
+
+
+@pytest.mark.parametrize(("kind", "style"), THINGS)
+def test_what_has_no_landmarks_wears_nothing(fits: dict[str, Fit], kind: str, style: str) -> None:
+    fit = fits["parametric"]
+    with pytest.raises(CannotWear):
+        make(replace(fit, points=np.full_like(fit.points, np.nan)), kind, style)
+
+
+@pytest.mark.parametrize(("source", "style"), [*product(SOURCES, STYLES["glasses"][1:])])
+def test_glasses_stand_before_the_eyes_and_touch_nothing(
+    fits: dict[str, Fit], source: str, style: str
+) -> None:
+    fit = fits[source]
+    face, made = Face.of(fit), make(fit, "glasses", style)
+    panes = of_material(made, "lenses") @ face.rotation
+    for side in (-1, 1):
+        pane, pupil = panes[np.sign(panes[:, 0]) == side], face.pupil(side)
+        centre = (pane.max(axis=0) + pane.min(axis=0)) / 2
+        assert abs(centre[0] - pupil[0]) < 8 and abs(centre[1] - pupil[1]) < 8
+        assert 10 < centre[2] - face.front(pupil[:1], pupil[1:2])[0] < 36
+        assert 36 < np.ptp(pane[:, 0]) < 64 and 26 < np.ptp(pane[:, 1]) < 56
+    front = of_material(made, "frame", "lens")
+    depth = (front @ face.rotation)[:, 2]
+    # Temples run along the head; what is in front of the eyes is free of it.
+    assert behind_front_mm(fit, front[depth > panes[:, 2].min() - 4]) < 0.3
+    assert depth.min() < 15, "the temples reach the ears"
+
+
+def test_lenses_are_of_the_kind_that_is_asked_for(fits: dict[str, Fit]) -> None:
+    opacities = []
+    for lenses in LENSES:
+        made = make(fits["parametric"], "glasses", "round", lenses=lenses)
+        [pane] = [material for material in made.materials if material.name == "lenses"]
+        assert pane.gloss == 0.9
+        opacities.append(pane.opacity)
+    assert opacities == [0.08, 0.45, 0.85, 0.95]
+
+
+@pytest.mark.parametrize(("source", "style"), [*product(SOURCES, STYLES["mask"][1:])])
+def test_a_mask_covers_mouth_nostrils_and_chin(fits: dict[str, Fit], source: str, style: str) -> None:
+    fit = fits[source]
+    made = make(fit, "mask", style)
+    covered = [0, 13, 14, 17, 61, 291, 1, 2, 4, 5, 98, 327, 152, 199, 175]
+    assert covers(made, fit, fit.points[covered]).all()
+    bare = [33, 263, 168, 10, 151]
+    assert not covers(made, fit, fit.points[bare]).any()
+    # Nothing pokes through: wherever one looks at the cloth, it is before the head.
+    cloth = of_material(made, f"mask {style}")
+    middle = np.array([0.0, fit.points[13, 1], 30.0])
+    out = cloth - middle
+    length = np.linalg.norm(out, axis=1)
+    head = fit.outermost(middle, out / length[:, None])
+    assert np.nanmax(head - length) < 0.2
