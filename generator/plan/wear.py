@@ -18,7 +18,7 @@ STYLES: dict[str, tuple[str, ...]] = {
     "brows": (OWN, "natural"),
     "beard": (OWN, "full"),
     "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),
-    "headwear": (NOTHING, "cap"),
+    "headwear": (NOTHING, "cap", "beanie", "brimmed", "headscarf", "headband", "hard-hat"),
     "headphones": (NOTHING, "over-ear"),
     "mask": (NOTHING, "medical", "cloth", "ffp2"),
     "clothes": (NOTHING, "crew"),

@@ -40,15 +40,22 @@ class Taut:
             equations = np.unique(ConvexHull(known - centre).equations.round(9), axis=0)
         except (QhullError, ValueError) as error:
             raise CannotWear("too little of the head is there for it") from error
+        self._centre = centre
         self._normals, self._distances = equations[:, :3], -equations[:, 3]
         if self._distances.min() <= 0:
             raise CannotWear("the head is not shaped as one there")
 
-    def reach(self, towards: np.ndarray) -> np.ndarray:
-        """How far it reaches along unit vectors [..., 3], float64 [...]."""
+    def reach(self, towards: np.ndarray, origins: np.ndarray | None = None) -> np.ndarray:
+        """How far it reaches along unit vectors [..., 3], float64 [...].
+
+        origins: of each, float [..., 3], or the centre. From outside, a number below zero may come.
+        """
         facing = towards.reshape(-1, 3) @ self._normals.T
+        room = self._distances
+        if origins is not None:
+            room = room - (origins - self._centre).reshape(-1, 3) @ self._normals.T
         with np.errstate(divide="ignore"):
-            lengths = np.where(facing > 1e-9, self._distances / np.maximum(facing, 1e-9), np.inf)
+            lengths = np.where(facing > 1e-9, room / np.maximum(facing, 1e-9), np.inf)
         return lengths.min(axis=1).reshape(towards.shape[:-1])
 
 

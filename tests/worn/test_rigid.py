@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from where import SOURCES, behind_front_mm, covers, of_material
 
-from generator.heads.labels import GLASSES, MASK
+from generator.heads.labels import GLASSES, HEADWEAR, MASK
 from generator.heads.mesh import HeadMesh
 from generator.plan.wear import LENSES, STYLES
 from generator.registries import WORN
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear, Fit
 
-LABELS = {"glasses": GLASSES, "mask": MASK}
+LABELS = {"glasses": GLASSES, "mask": MASK, "headwear": HEADWEAR}
 THINGS = [(kind, style) for kind in LABELS for style in STYLES[kind][1:]]
 MOST_TRIANGLES = 6000
 
@@ -100,3 +100,40 @@ def test_a_mask_covers_mouth_nostrils_and_chin(fits: dict[str, Fit], source: str
     length = np.linalg.norm(out, axis=1)
     head = fit.outermost(middle, out / length[:, None])
     assert np.nanmax(head - length) < 0.2
+
+
+@pytest.mark.parametrize(("source", "style"), [*product(SOURCES, STYLES["headwear"][1:])])
+def test_what_is_on_the_head_encloses_it_and_leaves_the_face(
+    fits: dict[str, Fit], source: str, style: str
+) -> None:
+    fit = fits[source]
+    made, face = make(fit, "headwear", style), Face.of(fit)
+    head = face.vertices
+    top, chin = face.at(10)[0, 1], face.at(152)[0, 1]
+    if style == "headscarf":  # skull and ears
+        kept = (head[:, 1] > chin + 45) & (head[:, 2] < 15)
+    elif style == "headband":  # what is behind the band at the height of the front's middle
+        band = made.vertices @ face.rotation
+        middle = band[band[:, 2] > 60][:, 1].mean()
+        kept = (np.abs(head[:, 1] - middle) < 8) & (head[:, 2] > 70)
+    else:
+        kept = head[:, 1] > top + 12
+    assert kept.sum() > 10
+    assert covers(made, fit, head[kept] @ face.rotation.T).all()
+    assert not covers(made, fit, fit.points[[33, 263, 1, 13, 4, 61, 291]]).any()
+
+
+@pytest.mark.parametrize("style", ["cap", "beanie", "brimmed", "hard-hat"])
+def test_a_hat_leaves_the_lobes_of_the_ears(fits: dict[str, Fit], style: str) -> None:
+    fit = fits["facescape"]
+    made, face = make(fit, "headwear", style), Face.of(fit)
+    ear = face.sides[1].ear
+    assert ear.found
+    low = face.vertices[
+        (face.vertices[:, 0] > 60)
+        & (face.vertices[:, 1] < ear.top - 25)
+        & (face.vertices[:, 1] > ear.bottom)
+        & (face.vertices[:, 2] < ear.front)
+        & (face.vertices[:, 2] > ear.back)
+    ]
+    assert len(low) > 5 and not covers(made, fit, low @ face.rotation.T).any()
