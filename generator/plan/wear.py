@@ -19,10 +19,10 @@ STYLES: dict[str, tuple[str, ...]] = {
     "beard": (OWN, "full"),
     "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),
     "headwear": (NOTHING, "cap", "beanie", "brimmed", "headscarf", "headband", "hard-hat"),
-    "headphones": (NOTHING, "over-ear"),
+    "headphones": (NOTHING, "over-ear", "on-ear", "earbuds"),
     "mask": (NOTHING, "medical", "cloth", "ffp2"),
     "clothes": (NOTHING, "crew"),
-    "occluder": (NOTHING, "hand"),
+    "occluder": (NOTHING, "hand", "phone", "mug", "microphone", "paper"),
 }
 """Kind -> its styles, of which the first is the default and adds nothing."""
 

@@ -153,9 +153,15 @@ def bar(width: float, height: float, rounding: float = 0.5) -> np.ndarray:
     )
 
 
-def limb(path: np.ndarray, radii: np.ndarray | float, count: int = 10, flat: float = 1.0) -> Shape:
+def limb(
+    path: np.ndarray,
+    radii: np.ndarray | float,
+    count: int = 10,
+    flat: float = 1.0,
+    up: np.ndarray | None = None,
+) -> Shape:
     """A round sweep with round ends. path: float [N, 3]. radii: of each of its points. flat: its height over
-    its width, along the path's own up."""
+    its width, along up."""
     path = np.asarray(path, dtype=np.float64)
     radii = np.broadcast_to(np.asarray(radii, dtype=np.float64), len(path))
     fall = np.radians([80, 55, 25])
@@ -164,8 +170,8 @@ def limb(path: np.ndarray, radii: np.ndarray | float, count: int = 10, flat: flo
     behind = path[-1] + radii[-1] * np.sin(fall[::-1])[:, None] * end
     full = np.concatenate([before, path, behind])
     full_radii = np.concatenate([radii[0] * np.cos(fall), radii, radii[-1] * np.cos(fall[::-1])])
-    up = _steady_up(full)
-    return sweep(full, circle(1.0, count)[None] * full_radii[:, None, None] * [1, flat], up)
+    profile = circle(1.0, count)[None] * full_radii[:, None, None] * [1, flat]
+    return sweep(full, profile, _steady_up(full) if up is None else up)
 
 
 def ball(centre: np.ndarray, radii: np.ndarray, axes: np.ndarray | None = None, count: int = 12) -> Shape:

@@ -10,14 +10,20 @@ import numpy as np
 import pytest
 from where import SOURCES, behind_front_mm, covers, of_material
 
-from generator.heads.labels import GLASSES, HEADWEAR, MASK
+from generator.heads.labels import GLASSES, HEADWEAR, MASK, OCCLUDER
 from generator.heads.mesh import HeadMesh
 from generator.plan.wear import LENSES, STYLES
 from generator.registries import WORN
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear, Fit
 
-LABELS = {"glasses": GLASSES, "mask": MASK, "headwear": HEADWEAR}
+LABELS = {
+    "glasses": GLASSES,
+    "mask": MASK,
+    "headwear": HEADWEAR,
+    "headphones": HEADWEAR,
+    "occluder": OCCLUDER,
+}
 THINGS = [(kind, style) for kind in LABELS for style in STYLES[kind][1:]]
 MOST_TRIANGLES = 6000
 
@@ -137,3 +143,42 @@ def test_a_hat_leaves_the_lobes_of_the_ears(fits: dict[str, Fit], style: str) ->
         & (face.vertices[:, 2] > ear.back)
     ]
     assert len(low) > 5 and not covers(made, fit, low @ face.rotation.T).any()
+
+
+@pytest.mark.parametrize(("source", "style"), [*product(SOURCES, ["over-ear", "on-ear"])])
+def test_cups_are_at_the_ears_and_the_band_is_over_the_crown(
+    fits: dict[str, Fit], source: str, style: str
+) -> None:
+    fit = fits[source]
+    face = Face.of(fit)
+    made = make(fit, "headphones", style)
+    cushions = of_material(made, "cushions") @ face.rotation
+    for side in (-1, 1):
+        ear = face.sides[side].ear
+        assert ear.found
+        cup = cushions[(np.sign(cushions[:, 0]) == side) & (cushions[:, 1] < ear.top + 20)]
+        middle = (cup.max(axis=0) + cup.min(axis=0)) / 2
+        assert abs(middle[1] - (ear.top + ear.bottom) / 2) < 4
+        assert abs(middle[2] - (ear.front + ear.back) / 2) < 4
+    crown = face.vertices[face.vertices[:, 1].argmax()]
+    band = of_material(made, "headphones") @ face.rotation
+    highest = band[:, 1].max()
+    assert 2 < highest - crown[1] < 40
+    lifted = make(fit, "headphones", style, headwear="cap")
+    assert (of_material(lifted, "headphones") @ face.rotation)[:, 1].max() > highest + 10
+    with pytest.raises(CannotWear, match="hard-hat"):
+        make(fit, "headphones", style, headwear="hard-hat")
+
+
+@pytest.mark.parametrize(("source", "style"), [*product(SOURCES, STYLES["occluder"][1:])])
+def test_what_is_before_the_face_stands_before_the_nose(
+    fits: dict[str, Fit], source: str, style: str
+) -> None:
+    fit = fits[source]
+    face = Face.of(fit)
+    made = make(fit, "occluder", style)
+    things = made.vertices @ face.rotation
+    nose = face.at(1, 4)
+    assert 15 < things[:, 2].min() - nose[:, 2].max() < 65
+    assert covers(made, fit, fit.points[[4]]).all()
+    assert 60 < np.ptp(things[:, :2], axis=0).max() < 370, "as large as a hand, or a sheet of paper"
