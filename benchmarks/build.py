@@ -2,12 +2,14 @@
 """How fast a build is, against the script one would write first.
 
     python benchmarks/build.py [--frames 2000]
+    python benchmarks/build.py --variety photo [--frames 2000]
 
 In one run, on this machine: a naive script (one process, Principled, 16
 samples, denoised, landmarks afterwards), the rate that CPU time allows,
 ``headturn build`` by every executor, the share of time in each stage, the
-resident memory of every process, and the quality preset. Run it on a quiet
-machine; it prints the load it found.
+resident memory of every process, and the quality preset. With --variety: builds
+of that variety and of none by turns, in the same processes, and their resident
+memory. Run it on a quiet machine; it prints the load it found.
 """
 
 from __future__ import annotations
@@ -30,6 +32,9 @@ from generator.plan.config import load_config
 from generator.process import available_cores
 
 NAIVE = Path(__file__).with_name("naive_script.py")
+
+ROUNDS = 4
+"""Turns of each variety that count; one before them does not, in which everything is loaded."""
 
 
 class Clock:
@@ -93,6 +98,50 @@ def timed_build(
     return clock.rate
 
 
+def by_turns(heads: Path, variety: str, frames: int, folder: Path) -> None:
+    """Images a second of a variety beside none, frames images of one head each in ROUNDS turns.
+
+    Prints the rates, their ratio, and the resident memory of every process while it counted.
+    """
+    with open_executor("local") as lanes:
+
+        def turn(number: int, name: str, count: int) -> Clock:
+            """The seed is another each time, so that no turn has the poses or the looks of another."""
+            config = load_config(
+                None,
+                {
+                    "heads": {"source": str(heads)},
+                    "poses": {"kind": "sobol", "count": count, "yaw": [-50, 50], "seed": number},
+                    "render": {"variety": name, "resolution": 256},
+                },
+            )
+            clock = Clock()
+            build(config, folder / f"{name}-{number}", lanes, clock)
+            return clock
+
+        names = ("none", variety)
+        for name in names:
+            turn(0, name, 100)
+        sampler = Resident()
+        sampler.start()
+        clocks: dict[str, list[Clock]] = {name: [] for name in names}
+        for number in range(1, ROUNDS + 1):
+            for name in names:
+                clocks[name].append(turn(number, name, frames // ROUNDS))
+        sampler.stop()
+    for name, turns in clocks.items():
+        each = ", ".join(f"{clock.rate:.1f}" for clock in turns)
+        print(f"variety {name:8} {overall(turns):6.1f} images/s  (by turns {each})")
+    ratio = overall(clocks[variety]) / overall(clocks["none"])
+    print(f"{variety} has {ratio:.0%} of the rate of none; resident memory of both, first and last quarter:")
+    print(sampler.quarters())
+
+
+def overall(turns: list[Clock]) -> float:
+    """Images a second of some turns together."""
+    return sum(clock.frames for clock in turns) / sum(clock.ended - clock.began for clock in turns)
+
+
 def cpu_limit(heads: Path, folder: Path, frames: int = 200) -> float:
     """Images a second that the CPU time of one lane allows on all cores: nothing waits for anything.
 
@@ -135,12 +184,16 @@ def main() -> None:
     parser.add_argument("--naive-frames", type=int, default=16)
     parser.add_argument("--executors", default="serial,local,ray", help="which, separated by commas")
     parser.add_argument("--no-quality", action="store_true")
+    parser.add_argument("--variety", help="that one beside none, by turns, and nothing else")
     arguments = parser.parse_args()
     load = os.getloadavg()[0]
     print(f"cores: {len(available_cores())}; load before: {load:.1f}; 256 x 256, one parametric head")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         make_heads(folder / "heads", count=1, seed=0)
+        if arguments.variety:
+            by_turns(folder / "heads", arguments.variety, arguments.frames, folder)
+            return
         [mesh] = (folder / "heads").rglob("neutral.obj")
         command = [sys.executable, str(NAIVE), str(mesh), str(arguments.naive_frames)]
         naive = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()[-1])

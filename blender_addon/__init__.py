@@ -13,9 +13,19 @@ from types import ModuleType
 
 def _modules() -> tuple[ModuleType, ...]:
     """What is registered, in order. Imported when asked for: core/ is read where there is no bpy."""
-    from . import build_operators, command, handlers, operators, panel, preferences, properties
+    from . import (
+        build_operators,
+        command,
+        handlers,
+        look_operators,
+        operators,
+        panel,
+        preferences,
+        properties,
+    )
 
-    return properties, preferences, operators, build_operators, panel, handlers, command
+    buttons = operators, look_operators, build_operators
+    return properties, preferences, *buttons, panel, handlers, command
 
 
 def register() -> None:

@@ -41,6 +41,15 @@ def look(shown: Shown) -> None:
 
 
 @_unless_quiet
+def look_seed(shown: Shown) -> None:
+    """The seed of a look was typed."""
+    if shown.head is not None:
+        from . import looks
+
+        looks.show(shown)
+
+
+@_unless_quiet
 def plan(shown: Shown) -> None:
     """The poses of the dataset."""
     from . import timeline

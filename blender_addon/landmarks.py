@@ -10,10 +10,12 @@ from typing import Any
 
 import bpy
 
+from generator.plan.settings import Values
+
 from . import session, windows
 from .core.conversation import OnAnswer
 from .session import Shown
-from .settings import chosen_head, pose, radius_mm, to_config
+from .settings import chosen_head, pose, radius_mm, still_config
 
 SETTLE_S = 0.15
 _wanted: list[str] = []
@@ -31,16 +33,21 @@ def pose_changed(shown: Shown) -> None:
 
 
 def request_pictures(
-    shown: Shown, poses: Sequence[tuple[float, ...]], busy: str, on_answer: OnAnswer, sheet: int = 0
+    shown: Shown,
+    config: Values,
+    poses: Sequence[tuple[float, ...]],
+    busy: str,
+    on_answer: OnAnswer,
+    sheet: int = 0,
 ) -> None:
-    """Have the host render poses of the head that is shown, as a build would, and find its face.
+    """Have the host render poses of the head that is shown, as a build of config would, and find its face.
 
     sheet: columns of a picture that shows all of them; 0 for none.
     """
     folder = Path(tempfile.gettempdir()) / f"headturn-pictures-{shown.id_data.name}"
     message = {
         "op": "pictures",
-        "config": to_config(shown),
+        "config": config,
         "package": shown.package,
         "head": "/".join(chosen_head(shown)),
         "radius_mm": radius_mm(shown),
@@ -64,5 +71,5 @@ def _ask() -> float | None:
         session.state.landmarks = (angles, answer["landmarks"][0])
         windows.redraw_views()
 
-    request_pictures(scene.headturn, [angles], "", take)
+    request_pictures(scene.headturn, still_config(scene.headturn), [angles], "", take)
     return None

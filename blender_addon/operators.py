@@ -30,14 +30,16 @@ def source_is_named(cls: Any, context: bpy.types.Context) -> bool:
     return True
 
 
-def _nothing_is_due(cls: Any) -> bool:
+def nothing_is_due(cls: Any) -> bool:
+    """For a poll: has the host answered everything?"""
     if session.conversation.is_busy:
         cls.poll_message_set("Wait for what is going on")
         return False
     return True
 
 
-def _there_is_a_head(cls: Any, context: bpy.types.Context) -> bool:
+def there_is_a_head(cls: Any, context: bpy.types.Context) -> bool:
+    """For a poll: is a head in view?"""
     if context.scene.headturn.head is None:
         cls.poll_message_set("Load heads first")
         return False
@@ -64,7 +66,7 @@ class LoadHeads(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return source_is_named(cls, context) and _nothing_is_due(cls)
+        return source_is_named(cls, context) and nothing_is_due(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import heads
@@ -123,7 +125,7 @@ class LookThroughCamera(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _there_is_a_head(cls, context)
+        return there_is_a_head(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import studio
@@ -140,7 +142,7 @@ class PreviewExtremes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _nothing_is_due(cls) and _there_is_a_head(cls, context)
+        return nothing_is_due(cls) and there_is_a_head(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import landmarks
@@ -148,11 +150,7 @@ class PreviewExtremes(bpy.types.Operator):
 
         def take(answer: dict[str, Any]) -> None:
             pictures.keep(pictures.SHEET, Path(answer["sheet"]))
-            image = bpy.data.images.get(EXTREMES)
-            if image is None:
-                image = bpy.data.images.load(answer["sheet"])
-                image.name = EXTREMES
-            image.reload()
+            windows.keep_image(EXTREMES, answer["sheet"])
             session.state.take_extremes(answer["landmarks"])
 
         shown = context.scene.headturn
@@ -161,7 +159,10 @@ class PreviewExtremes(bpy.types.Operator):
         except HeadturnError as error:
             self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
-        landmarks.request_pictures(shown, poses, "rendering the extremes...", take, sheet=SHEET_COLUMNS)
+        config = settings.to_config(shown)
+        landmarks.request_pictures(
+            shown, config, poses, "rendering the extremes...", take, sheet=SHEET_COLUMNS
+        )
         return {"FINISHED"}
 
 

@@ -9,9 +9,11 @@ import bpy
 
 from . import building, pictures
 from .core import panel
+from .core.labels import one_line
+from .core.looks import Look
 from .rows import draw_rows
 from .session import Shown, conversation, state
-from .settings import chosen_head, to_config
+from .settings import chosen_head, pose, to_config
 from .wrapping import message
 
 NARROW = 16
@@ -134,6 +136,40 @@ class LookPanel(_Tab, bpy.types.Panel):
         draw_rows(self.layout, shown, panel.rows(("render",), to_config(shown)))
 
 
+class LooksPanel(_Tab, bpy.types.Panel):
+    """Looks that are drawn, by their seeds."""
+
+    bl_idname = "HEADTURN_PT_looks"
+    bl_label = "Looks"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, shown = self.layout, context.scene.headturn
+        layout.prop(shown, "draws")
+        layout.operator("headturn.roll_dice", icon="SHADERFX")
+        row = layout.row(align=True)
+        row.prop(shown, "look_seed")
+        row.operator("headturn.show_look", text="", icon="FILE_REFRESH")
+        if state.look is not None and (line := panel.look(state, chosen_head(shown), pose(shown))):
+            icon = pictures.icon(pictures.LOOK)
+            if icon:
+                layout.template_icon(icon_value=icon, scale=9)
+            message(layout, context, line)
+            self._draw_values(layout.column(align=True), state.look)
+        layout.operator("headturn.look_sheet", icon="IMAGE_DATA")
+        icon = pictures.icon(pictures.LOOKS)
+        if icon:
+            layout.template_icon(icon_value=icon, scale=9)
+            layout.operator("headturn.open_looks", icon="WINDOW")
+
+    @staticmethod
+    def _draw_values(column: bpy.types.UILayout, look: Look) -> None:
+        column.scale_y = 0.75
+        for name, value in look.values():
+            split = column.split(factor=0.5)
+            split.label(text=one_line(name))
+            split.label(text=one_line(value))
+
+
 class BuildPanel(_Tab, bpy.types.Panel):
     """The dataset, and the build."""
 
@@ -176,7 +212,7 @@ def _stepper(layout: bpy.types.UILayout, shown: Shown, name: str, several: bool)
         button.what, button.by = name.upper(), by
 
 
-_CLASSES = (HeadsPanel, SelectionPanel, PosePanel, PosesPanel, LookPanel, BuildPanel)
+_CLASSES = (HeadsPanel, SelectionPanel, PosePanel, PosesPanel, LookPanel, LooksPanel, BuildPanel)
 
 
 def register() -> None:

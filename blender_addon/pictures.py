@@ -9,6 +9,9 @@ from typing import Any
 SHEET = "sheet"
 """Of the outermost poses."""
 
+LOOK, LOOKS = "look", "Headturn looks"
+"""What the dice show, one or a sheet."""
+
 _collections: list[Any] = []
 
 

@@ -91,6 +91,17 @@ def _shown() -> dict[str, Any]:
             ),
             update=edits.view,
         ),
+        "look_seed": IntProperty(
+            name="Seed",
+            description="The same seed is the same look, of a build with this seed too. Type one to see it",
+            min=0,
+            update=edits.look_seed,
+        ),
+        "draws": StringProperty(
+            name="Draws",
+            description="Distributions of numbers, instead of those above: lens_mm=uniform:28,135 "
+            "ambient=head:normal:0.4,0.1",
+        ),
         "out": StringProperty(
             name="Dataset",
             description="Folder of the dataset: new, empty, or one that an interrupted build left",

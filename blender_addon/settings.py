@@ -12,18 +12,34 @@ import bpy
 
 from generator.errors import UsageError
 from generator.plan.settings import Poses, Values
+from generator.plan.variety import NONE
 
 from .core.config import read_config, write_config
+from .core.draws import draws_something, with_draws, without_draws
 from .core.field import Get
 from .core.fields import fields
 from .core.state import HeadName
 from .core.tables import Sections, check_shown, configuration, located, properties_of, section_of
 from .session import Shown, quiet
 
+VARIETY, DICE = "render_variety", "photo"
+"""The property of the variety; which one the dice draw where none is chosen."""
+
 
 def to_config(shown: Shown) -> Values:
     """The configuration that this scene shows, and what a loaded file held besides; paths are absolute."""
-    return configuration(_getter(shown), json.loads(shown.carried or "{}"))
+    return with_draws(_numbers(shown, _getter(shown)), shown.draws)
+
+
+def look_config(shown: Shown) -> Values:
+    """The same for the dice: where nothing is drawn, all is drawn as in photographs."""
+    config = to_config(shown)
+    return config if draws_something(config) else _numbers(shown, _of_variety(_getter(shown), DICE))
+
+
+def still_config(shown: Shown) -> Values:
+    """The same as the 3D view shows it: nothing is drawn."""
+    return _numbers(shown, _of_variety(_getter(shown), NONE))
 
 
 def from_config(shown: Shown, config: Values) -> None:
@@ -31,6 +47,7 @@ def from_config(shown: Shown, config: Values) -> None:
 
     Raises TypeError, ValueError or OverflowError if the panel cannot show a value.
     """
+    config, draws = without_draws(config)
     with quiet():
         for field in fields():
             for name in field.properties():
@@ -38,6 +55,7 @@ def from_config(shown: Shown, config: Values) -> None:
         for name, value in properties_of(config).items():
             setattr(shown, name, value)
         shown.carried = json.dumps(config)
+        shown.draws = draws
     check_shown(_getter(shown), config)
 
 
@@ -65,7 +83,7 @@ def poses(shown: Shown) -> Poses:
 
 def planned(shown: Shown) -> Sections:
     """The sections of this scene that views follow from."""
-    config = to_config(shown)
+    config = still_config(shown)
     return Sections(section_of(config, "render"), section_of(config, "poses"))
 
 
@@ -92,6 +110,14 @@ def cache_folder() -> Path:
 def absolute(path: str) -> str:
     """A path of a property; // is the folder of the .blend."""
     return str(Path(bpy.path.abspath(path)).absolute()) if path else ""
+
+
+def _numbers(shown: Shown, get: Get) -> Values:
+    return configuration(get, json.loads(shown.carried or "{}"))
+
+
+def _of_variety(get: Get, variety: str) -> Get:
+    return lambda name: variety if name == VARIETY else get(name)
 
 
 def _getter(shown: Shown) -> Get:

@@ -27,6 +27,15 @@ def redraw_views() -> None:
             area.tag_redraw()
 
 
+def keep_image(name: str, path: str) -> None:
+    """Have the file at path as the image of this name, read anew."""
+    image = bpy.data.images.get(name)
+    if image is None:
+        image = bpy.data.images.load(path)
+        image.name = name
+    image.reload()
+
+
 def open_window(kind: str, slot: str, what: Any) -> None:
     """Show what in a window of its own. kind: of its area. slot: of the area's space."""
     bpy.ops.wm.window_new()

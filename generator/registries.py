@@ -35,7 +35,7 @@ PASSES: Registry[Any] = Registry(
     "--passes",
     {
         name: f"generator.plan.passes:{name.upper()}"
-        for name in ("depth", "normal", "position", "uv", "object_index")
+        for name in ("depth", "normal", "position", "uv", "object_index", "albedo", "segmentation")
     },
 )
 """``--passes``: a :class:`generator.plan.passes.Pass`."""

@@ -100,6 +100,16 @@ def landmarks(state: State) -> Line | None:
     return Line(f"{len(state.landmarks[1])} landmarks found", "CHECKMARK")
 
 
+def look(state: State, head: HeadName, pose: tuple[float, ...]) -> Line | None:
+    """Which look the picture shows, and whether it is that of the head and pose in view."""
+    if state.look is None:
+        return None
+    if (state.look.head, state.look.pose) == (head, pose):
+        return Line(f"seed {state.look.seed}", "CHECKMARK")
+    of = ", ".join(f"{angle:g}" for angle in state.look.pose)
+    return Line(f"seed {state.look.seed}, {state.look.head[0]} at {of}: show it again for this pose", "INFO")
+
+
 def pose_count(values: Values) -> Line:
     """How many poses a head gets, or why the plan makes no sense. values: with absolute paths."""
     from .grid import NotDrawn, plan_poses  # numpy comes in with the first tab that is opened

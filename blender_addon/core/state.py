@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from .looks import Look
+
 if TYPE_CHECKING:
     from .host import Host, HostFacts
 
@@ -20,7 +22,8 @@ class State:
     """Not saved with the file.
 
     displayed: the head in view. landmarks: at which pose, and the 468 points in pixels, None if no face
-    was found. checking: is the host being looked for? error: what went wrong last, "" if all is well.
+    was found. look: what the dice showed last. checking: is the host being looked for? error: what went
+    wrong last, "" if all is well.
     """
 
     host: Host | None = None
@@ -36,6 +39,7 @@ class State:
     displayed: HeadName | None = None
     extremes: str = ""
     landmarks: tuple[tuple[float, ...], list[list[float]] | None] | None = None
+    look: Look | None = None
 
     def subjects(self) -> list[str]:
         """Subjects in the source's order."""

@@ -18,8 +18,10 @@ from generator.plan.settings import (
     Render,
     Values,
     all_settings,
+    plain,
     with_defaults,
 )
+from generator.plan.variety import VARIETY
 
 from .config import same
 from .field import Field, Get
@@ -73,13 +75,15 @@ def configuration(get: Get, told: Values) -> Values:
 
     get: paths are absolute. Blender's numbers have 32 bits: where a property shows what the file told, the
     file's own digits stay. A setting that means nothing here is left out, unless it meant nothing in
-    the file either.
+    the file either; and one that nobody has touched, where the variety draws it.
     """
     result = {name: dict(table) for name, table in told.items()}
+    drawn = VARIETY.get(get("render_variety"), {})
     for field, value in _shown(get, told):
         section, key = field.setting.section, field.setting.key
         table = result.setdefault(section, {})
-        if value is None:
+        left = section == "render" and key in drawn and key not in told.get(section, {})
+        if value is None or (left and same(value, plain(field.setting.default))):
             table.pop(key, None)
         elif key not in table or not field.shows(table[key], value):
             table[key] = value

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,14 @@ import bpy
 from generator.blender import compat
 from generator.blender.clearing import clear
 from generator.blender.crop import Backdrop, Backdrops, Box, Outline, around
-from generator.blender.passes import render_passes
+from generator.blender.needs import Needs
+from generator.blender.passes import render_painted, render_passes
 from generator.blender.stage import Stage
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import load_package
+from generator.labels import LABELS
 from generator.plan.environment_light import EnvironmentLight
+from generator.plan.passes import PAINTED_SAMPLES
 from generator.plan.views import View
 from generator.plan.wear import Worn
 
@@ -109,6 +113,18 @@ class Images:
             self._knows_uv = True
         render_passes(path, stage.head, stage.objects[1:], passes)
 
+    def render_painted(
+        self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()
+    ) -> None:
+        """Render the painted passes of a view beside path; see :mod:`generator.blender.passes`."""
+        look = replace(view.look, preset="fast", samples=PAINTED_SAMPLES)
+        stage = self._show(replace(view, look=look), None, worn)
+        meshes = [self._mesh, *(self._worn[one.package] for one in worn)]
+        materials = [material for mesh in meshes for material in mesh.materials]
+        mapped = any(material.label_map for material in materials)
+        labels = LABELS if mapped else {material.label for material in materials}
+        render_painted(path, stage.objects, labels, passes)
+
     def _box(self, view: View, worn: Sequence[Worn]) -> Box | None:
         """The pixels that the head and what it wears can cover."""
         boxes = [self._outline.box(view.pose, view.camera)]
@@ -118,11 +134,12 @@ class Images:
     def _show(self, view: View, environment: EnvironmentLight | None, worn: Sequence[Worn]) -> Stage:
         has_one = environment is not None
         if self._stage is None or not self._stage.fits(view.look, has_one):
+            needs = Needs.of(view.look, has_one)
+            if self._stage is not None and view.look.preset == "fast":
+                needs |= self._stage.needs  # the next look may need again what this one does not
             self._stage = None
             clear()
-            self._stage = Stage(
-                bpy.context.scene, self._mesh, view.look, threads=self._threads, environment=has_one
-            )
+            self._stage = Stage(bpy.context.scene, self._mesh, view.look, threads=self._threads, needs=needs)
             self._stage.hang(self._worn)
         self._stage.show(view, environment, worn)
         return self._stage

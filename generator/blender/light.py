@@ -10,8 +10,10 @@ from typing import Protocol
 import bpy
 from mathutils import Vector
 
-from generator.blender.environment import set_environment
-from generator.blender.materials import DIRECTION, STRENGTH, srgb_to_linear
+from generator.blender.fast_light import FastLight
+from generator.blender.lamps import key_direction, key_strengths, lamp_light
+from generator.blender.materials import set_gloss, srgb_to_linear
+from generator.blender.needs import Needs
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 
@@ -35,47 +37,25 @@ class Light(Protocol):
         ...
 
 
-def key_direction(look: Look) -> tuple[float, float, float]:
-    """Unit vector from the head to the key light in frame B (x right, y into the scene, z up)."""
-    yaw, pitch = math.radians(look.light_yaw_deg), math.radians(look.light_pitch_deg)
-    return (
-        -math.sin(yaw) * math.cos(pitch),
-        -math.cos(yaw) * math.cos(pitch),
-        math.sin(pitch),
-    )
-
-
-def key_strengths(look: Look, environment: EnvironmentLight | None) -> tuple[float, float]:
-    """Strength of the key light, and of white light from everywhere."""
-    return (look.environment_key, 0.0) if environment else (1.0 - look.ambient, look.ambient)
-
-
-def build_light(scene: bpy.types.Scene, preset: str, environment: bool) -> Light:
-    """World and light of a preset.
-
-    environment: may it be that of a panorama? In the quality preset it then has to be.
-    """
+def build_light(scene: bpy.types.Scene, needs: Needs, fast: FastLight | None) -> Light:
+    """World and light of a stage. fast: what its materials compute; without one they are path traced, and a
+    panorama has to light them if they need one."""
     world = bpy.data.worlds.new("surroundings")
     scene.world = world
     world.use_nodes = True
     # The world is one colour: sampling it as a lamp only adds noise.
     world.cycles.sampling_method = "NONE"
     world.node_tree.nodes.clear()
-    if preset == "fast":
-        return LightInMaterials(world, environment)
-    return LightInScene(scene, world, environment)
+    if fast is not None:
+        return LightInMaterials(world, fast)
+    return LightInScene(scene, world, needs)
 
 
-class LightInMaterials:
-    """The fast preset: every material computes light from the normal."""
+class _Materials:
+    """What is lit: its gloss is set with the light."""
 
-    def __init__(self, world: bpy.types.World, environment: bool) -> None:
-        tree = world.node_tree
-        output = tree.nodes.new("ShaderNodeOutputWorld")
-        self._background = tree.nodes.new("ShaderNodeBackground")
-        tree.links.new(self._background.outputs[0], output.inputs["Surface"])
+    def __init__(self) -> None:
         self._materials: list[bpy.types.Material] = []
-        self._knows_environments = environment
 
     def add(self, materials: Sequence[bpy.types.Material]) -> None:
         """See :class:`Light`."""
@@ -85,23 +65,36 @@ class LightInMaterials:
         """See :class:`Light`."""
         self._materials = [material for material in self._materials if material not in materials]
 
+    def set_gloss(self, look: Look) -> None:
+        """Make it that of a look."""
+        for material in self._materials:
+            set_gloss(material, look.gloss)
+
+
+class LightInMaterials(_Materials):
+    """The fast preset: every material computes light from the normal."""
+
+    def __init__(self, world: bpy.types.World, fast: FastLight) -> None:
+        super().__init__()
+        tree = world.node_tree
+        output = tree.nodes.new("ShaderNodeOutputWorld")
+        self._background = tree.nodes.new("ShaderNodeBackground")
+        tree.links.new(self._background.outputs[0], output.inputs["Surface"])
+        self._fast = fast
+
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
-        key, ambient = key_strengths(look, environment)
-        for nodes in (material.node_tree.nodes for material in self._materials):
-            nodes[DIRECTION].inputs[1].default_value = key_direction(look)
-            nodes[STRENGTH].inputs[1].default_value = key
-            nodes[STRENGTH].inputs[2].default_value = ambient
-        if self._knows_environments:
-            set_environment(environment)
+        self._fast.set(look, environment)
+        self.set_gloss(look)
 
 
-class LightInScene:
-    """The quality preset: a sun, and surroundings that are white, or a panorama, whatever colour the camera
+class LightInScene(_Materials):
+    """The quality preset: suns, and surroundings that are white, or a panorama, whatever colour the camera
     sees behind the head."""
 
-    def __init__(self, scene: bpy.types.Scene, world: bpy.types.World, environment: bool) -> None:
+    def __init__(self, scene: bpy.types.Scene, world: bpy.types.World, needs: Needs) -> None:
+        super().__init__()
         tree = world.node_tree
         output = tree.nodes.new("ShaderNodeOutputWorld")
         self._background = tree.nodes.new("ShaderNodeBackground")
@@ -114,20 +107,12 @@ class LightInScene:
         tree.links.new(self._background.outputs[0], mix.inputs[2])
         tree.links.new(mix.outputs[0], output.inputs["Surface"])
         self._panorama: Panorama | None = None
-        if environment:
+        if needs.environment:
             self._panorama = Panorama(tree, self._surroundings.inputs["Color"])
             world.cycles.sampling_method = "MANUAL"  # towards where it is bright
             world.cycles.sample_map_resolution = 512
-        self._lamp = bpy.data.lights.new("key", "SUN")
-        self._lamp.angle = SUN_DIAMETER
-        self._key = bpy.data.objects.new("key", self._lamp)
-        scene.collection.objects.link(self._key)
-
-    def add(self, materials: Sequence[bpy.types.Material]) -> None:
-        """Lamps light whatever is there."""
-
-    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
-        """Lamps light whatever is there."""
+        self._key = _sun(scene, "key")
+        self._lamps = [_sun(scene, "lamp") for _ in range(needs.lamps)]
 
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
         """See :class:`Light`."""
@@ -136,9 +121,26 @@ class LightInScene:
         self._surroundings.inputs["Strength"].default_value = environment.scale if environment else ambient
         if self._panorama is not None and environment is not None:
             self._panorama.show(environment)
-        # A sun of strength pi lights a surface that faces it to its own colour.
-        self._lamp.energy = math.pi * key
-        self._key.rotation_euler = Vector(key_direction(look)).to_track_quat("Z", "Y").to_euler()
+        _shine_from(self._key, key_direction(look), (key, key, key))
+        for lamp, given in zip(self._lamps, look.lamps, strict=True):
+            _shine_from(lamp, *lamp_light(given))
+        self.set_gloss(look)
+
+
+def _sun(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    lamp = bpy.data.lights.new(name, "SUN")
+    lamp.angle = SUN_DIAMETER
+    made = bpy.data.objects.new(name, lamp)
+    scene.collection.objects.link(made)
+    return made
+
+
+def _shine_from(sun: bpy.types.Object, direction: Sequence[float], color: Sequence[float]) -> None:
+    """direction: to it. color: what it adds to a white surface that faces it; of strength pi it is white."""
+    strength = max(color)
+    sun.data.energy = math.pi * strength
+    sun.data.color = [value / strength if strength else 1.0 for value in color]
+    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
 
 
 class Panorama:

@@ -7,46 +7,70 @@ from pathlib import Path
 
 import bpy
 
-from generator.blender.environment import environment_group
+from generator.blender.fast_light import GLOSS, LIGHT, FastLight
+from generator.blender.label_group import labels_group
 from generator.blender.nodes import math_node, vector_node
 from generator.heads.mesh import Material
+from generator.heads.shine import gloss_of
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
+from generator.labels import LABELS
 
 VERTEX_COLORS = "Color"
 UV_MAP = "UVMap"
 
 _EXTENSIONS = {EXTEND: "EXTEND", REPEAT: "REPEAT", MIRROR: "MIRROR"}
 
-DIRECTION, STRENGTH = "direction of the light", "strength of the light"
-"""Nodes of the fast preset's materials, which :mod:`generator.blender.light` sets."""
+MATT = (0.25, 0.55)
+"""Specular level and roughness without gloss. Never the source's own: FaceScape's material files say Ks 1,
+which turns skin to chrome."""
+
+GLOSSY, LEAST_ROUGHNESS = 0.35, 0.05
+"""Specular level of an index of refraction of 1.4; the roughness of what has all gloss."""
+
+CLEAREST = 0.02
+"""Opacity of a material that is clearer than that."""
+
+_PRINCIPLED, _LABEL, _GLOSS = "principled", "headturn_label", "headturn_gloss"
+
+
+LIT, ALBEDO, LABELLED = "lit", "albedo", "labelled"
+"""What a material may show: itself, its colour alone, or what it is. Under each it keeps a node's name."""
 
 
 def build_material(
-    material: Material, preset: str, *, has_vertex_colors: bool, environment: bool = False
+    material: Material, fast: FastLight | None, *, has_vertex_colors: bool
 ) -> bpy.types.Material:
-    """A Blender material with the head's colour and the preset's shading.
+    """A Blender material with the head's colour.
 
-    environment: may the light of a panorama be added?
+    fast: the light of the fast preset, that it computes; without one it is path traced.
     Raises FileNotFoundError or RuntimeError if the texture cannot be read.
     """
     made = bpy.data.materials.new(material.name)
+    made[_LABEL], made[_GLOSS] = material.label, material.gloss
     made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.nodes.new("ShaderNodeOutputMaterial")
     color, alpha = _base_color(tree, material, has_vertex_colors)
-    if preset == "fast":
-        # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
-        made.cycles.emission_sampling = "NONE"
-        surface = _lit_by_normal(tree, color, environment)
-    else:
-        surface = _principled(tree, color)
-    if material.cutout and alpha is not None:
-        surface = _cut_out(tree, surface, alpha)
-    if material.opacity < 1:
-        surface = _cut_out(tree, surface, _value(tree, material.opacity))
-    tree.links.new(surface, output.inputs["Surface"])
+    # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
+    made.cycles.emission_sampling = "NONE"
+    surface = _principled(tree, color) if fast is None else _lit_by_normal(tree, color, fast, material)
+    label = _label_color(tree, material)
+    for name, lit in ((LIT, surface), (ALBEDO, _emitted(tree, color)), (LABELLED, _emitted(tree, label))):
+        if material.cutout and alpha is not None:
+            lit = _cut_out(tree, lit, alpha)
+        if material.opacity < 1:
+            lit = _cut_out(tree, lit, _value(tree, material.opacity))
+        made[name] = lit.node.name
+    show(made, LIT)
     return made
+
+
+def show(material: bpy.types.Material, name: str) -> None:
+    """Have a material show one of LIT, ALBEDO and LABELLED: that is linked, the others cost nothing."""
+    tree = material.node_tree
+    [output] = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
+    tree.links.new(tree.nodes[material[name]].outputs[0], output.inputs["Surface"])
 
 
 def srgb_to_linear(color: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -109,47 +133,61 @@ def _load_image(path: Path) -> bpy.types.Image:
     return image
 
 
-def _lit_by_normal(
-    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, environment: bool
-) -> bpy.types.NodeSocket:
-    """Emission = colour x (ambient + (1 - ambient) x half-Lambert(normal . light)), or what a panorama gives
-    and a share of the key light.
-
-    Half-Lambert (Mitchell et al., "Illustrative rendering in Team Fortress 2",
-    2007) keeps the shadow side readable. No ray is traced beyond the first hit,
-    so the image has no noise.
-    """
-    geometry = tree.nodes.new("ShaderNodeNewGeometry")
-    dot = tree.nodes.new("ShaderNodeVectorMath")
-    dot.operation, dot.name = "DOT_PRODUCT", DIRECTION
-    tree.links.new(geometry.outputs["Normal"], dot.inputs[0])
-    wrapped = math_node(tree, "MULTIPLY_ADD", dot.outputs["Value"], 0.5, 0.5)
-    squared = math_node(tree, "MULTIPLY", wrapped, wrapped)
-    strength = math_node(tree, "MULTIPLY_ADD", squared)
-    strength.node.name = STRENGTH
+def _emitted(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     emission = tree.nodes.new("ShaderNodeEmission")
-    if environment:
-        # A product rounds as Blender's own of colour and strength does: without a panorama, the same pixels.
-        light = vector_node(tree, "ADD", _environment(tree), strength)
-        tree.links.new(_times(tree, color, light), emission.inputs["Color"])
-    else:
-        tree.links.new(color, emission.inputs["Color"])
-        tree.links.new(strength, emission.inputs["Strength"])
+    tree.links.new(color, emission.inputs["Color"])
     return emission.outputs[0]
 
 
-def _environment(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
-    node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = environment_group()
-    return node.outputs[0]
+def _label_color(tree: bpy.types.NodeTree, material: Material) -> bpy.types.NodeSocket:
+    """Red, green or blue where the material is one of the three classes that are told apart."""
+    if material.label_map is None:
+        number = _value(tree, LABELS.index(material.label))
+    else:
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = _load_image(material.label_map)
+        node.image.colorspace_settings.name = "Non-Color"
+        node.interpolation, node.extension = "Closest", _EXTENSIONS[material.wrap]
+        number = math_node(tree, "MULTIPLY", node.outputs["Color"], 255.0)
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = labels_group()
+    tree.links.new(number, group.inputs[0])
+    return group.outputs[0]
+
+
+def set_gloss(made: bpy.types.Material, skin: float) -> None:
+    """Give a material the gloss that it has where the skin has so much."""
+    gloss = gloss_of(Material(made.name, label=made[_LABEL], gloss=made[_GLOSS]), skin)
+    nodes = made.node_tree.nodes
+    if _PRINCIPLED in nodes:
+        level, roughness = (GLOSSY, max(LEAST_ROUGHNESS, 1 - gloss)) if gloss else MATT
+        nodes[_PRINCIPLED].inputs["Specular IOR Level"].default_value = level
+        nodes[_PRINCIPLED].inputs["Roughness"].default_value = roughness
+    elif GLOSS in nodes[LIGHT].inputs:
+        nodes[LIGHT].inputs[GLOSS].default_value = gloss
+
+
+def _lit_by_normal(
+    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, fast: FastLight, material: Material
+) -> bpy.types.NodeSocket:
+    """Emission = colour x what a white surface of this normal sends back, and what it mirrors."""
+    emission = tree.nodes.new("ShaderNodeEmission")
+    lit = fast.into(tree, gloss_of(material, 1.0 if fast.needs.gloss else 0.0) > 0)
+    sent = _times(tree, color, lit.light)
+    if lit.shine is not None:
+        mirrored = lit.shine
+        if material.opacity < 1:
+            # What is clear mirrors no less: the share that it hides is taken off again below.
+            mirrored = _times(tree, mirrored, _value(tree, 1 / max(material.opacity, CLEAREST)))
+        sent = vector_node(tree, "ADD", sent, mirrored)
+    tree.links.new(sent, emission.inputs["Color"])
+    return emission.outputs[0]
 
 
 def _principled(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    node.name = _PRINCIPLED
     tree.links.new(color, node.inputs["Base Color"])
-    # Never the source's own specular: FaceScape's material files say Ks 1, which turns skin to chrome.
-    node.inputs["Specular IOR Level"].default_value = 0.25
-    node.inputs["Roughness"].default_value = 0.55
     return node.outputs[0]
 
 

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
 from generator.blender import compat
-from generator.plan.passes import OBJECT_INDEX
+from generator.blender.label_group import tell_apart
+from generator.blender.materials import ALBEDO, LABELLED, LIT, show
+from generator.labels import LABELS
+from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, painted_file
 from generator.registries import PASSES
 
 HEAD_INDEX, WORN_INDEX = 1, 2
@@ -33,7 +36,7 @@ def render_passes(
     for thing in worn:
         thing.pass_index = WORN_INDEX
     layer = scene.view_layers[0]
-    switches = {PASSES.get(name).switch for name in PASSES}
+    switches = {PASSES.get(name).switch for name in PASSES} - {PAINTED}
     wanted = {OBJECT_INDEX.switch, *(PASSES.get(name).switch for name in passes)}
     with _restored(scene.cycles, "samples", "pixel_filter_type", "filter_width"):
         for switch in switches:
@@ -47,6 +50,37 @@ def render_passes(
         bpy.ops.render.render(write_still=True)
     for switch in switches:
         setattr(layer, switch, False)
+
+
+def render_painted(
+    path: Path, things: Sequence[bpy.types.Object], labels: Iterable[str], passes: Sequence[str]
+) -> None:
+    """Render the painted passes among some beside path, linear with alpha; see ``painted_file``.
+
+    things: everything that is seen. labels: the classes that there may be; of others there is no picture.
+    """
+    scene = bpy.context.scene
+    render, settings = scene.render, scene.render.image_settings
+    materials = [material for thing in things for material in thing.data.materials]
+    groups = sorted({LABELS.index(label) // LABELS_A_PICTURE for label in labels})
+    wanted = [(ALBEDO, 0)] if "albedo" in passes else []
+    wanted += [(LABELLED, group) for group in groups] if "segmentation" in passes else []
+    compat.use_still_images(settings)
+    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
+    settings.exr_codec = "NONE"
+    with _restored(scene.cycles, "pixel_filter_type", "filter_width"), _restored(render, "film_transparent"):
+        # The mean over the pixel itself, not over its neighbours.
+        scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
+        render.film_transparent, render.use_border = True, False
+        for what, group in wanted:
+            tell_apart(group)
+            for material in materials:
+                show(material, what)
+            name = "albedo" if what == ALBEDO else "segmentation"
+            render.filepath = str(path.with_name(painted_file(path.stem, name, group)))
+            bpy.ops.render.render(write_still=True)
+    for material in materials:
+        show(material, LIT)
 
 
 @contextmanager

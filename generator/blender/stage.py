@@ -9,8 +9,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from generator.blender.fast_light import OPENNESS, FastLight
 from generator.blender.light import Light, build_light
 from generator.blender.materials import UV_MAP, VERTEX_COLORS, build_material
+from generator.blender.needs import Needs
 from generator.geometry.camera import SENSOR_MM, Camera
 from generator.geometry.rotation import (
     BLENDER_FROM_GRAPHICS,
@@ -36,7 +38,7 @@ class Stage:
     ----------
     mesh: frame U, mm, pivot at the origin.
     look: of the first view. Its preset and samples stay; see :meth:`fits`.
-    threads: of Cycles; 0 lets Blender take every core. environment: may a panorama light it?
+    threads: of Cycles; 0 lets Blender take every core. needs: what looks after the first need, besides.
 
     Raises FileNotFoundError or RuntimeError if a texture cannot be read.
     """
@@ -48,15 +50,15 @@ class Stage:
         look: Look,
         *,
         threads: int = 0,
-        environment: bool = False,
+        needs: Needs | None = None,
     ) -> None:
         self.scene = scene
         self._kind = _kind(look)
-        self._knows_environments = environment
-        self._preset = look.preset
+        self.needs = needs or Needs.of(look)
+        self._fast = FastLight(self.needs) if look.preset == "fast" else None
         self.head = self._add("head", mesh)
         self._worn: dict[str, bpy.types.Object] = {}
-        self._light: Light = build_light(scene, look.preset, environment)
+        self._light: Light = build_light(scene, self.needs, self._fast)
         self._light.add(list(self.head.data.materials))
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(self._camera)
@@ -69,12 +71,12 @@ class Stage:
         """Can this stage show a look, lit by a panorama or not?
 
         Another preset has other materials, and Cycles keeps the sampling pattern of its first number of
-        samples: the image would depend on what was rendered before. In the fast preset a stage for panoramas
-        shows looks without one, too, to the same pixels.
+        samples: the image would depend on what was rendered before. In the fast preset a stage that can do
+        more than a look needs shows it, too, to the same pixels.
         """
-        if look.preset != "fast" and environment != self._knows_environments:
-            return False
-        return _kind(look) == self._kind and (self._knows_environments or not environment)
+        wanted = Needs.of(look, environment)
+        able = self.needs.cover(wanted) if look.preset == "fast" else self.needs == wanted
+        return able and _kind(look) == self._kind
 
     def show(
         self, view: View, environment: EnvironmentLight | None = None, worn: Sequence[Worn] = ()
@@ -115,9 +117,9 @@ class Stage:
         return [self.head, *self._worn.values()]
 
     def _add(self, name: str, mesh: HeadMesh) -> bpy.types.Object:
-        made = _build_object(name, mesh, self._preset, self._knows_environments)
+        made = _build_object(name, mesh, self._fast, self.needs)
         self.scene.collection.objects.link(made)
-        if self._preset == "fast":
+        if self._fast is not None:
             # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
             self.scene.collection.objects.link(_unseen_twin(made))
         return made
@@ -183,7 +185,7 @@ def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
     return twin
 
 
-def _build_object(name: str, mesh: HeadMesh, preset: str, environment: bool) -> bpy.types.Object:
+def _build_object(name: str, mesh: HeadMesh, fast: FastLight | None, needs: Needs) -> bpy.types.Object:
     made = bpy.data.meshes.new(name)
     faces = len(mesh.triangles)
     vertices = (mesh.vertices * METRES) @ BLENDER_FROM_GRAPHICS.T
@@ -203,15 +205,14 @@ def _build_object(name: str, mesh: HeadMesh, preset: str, environment: bool) -> 
         colors[:, :3] = mesh.vertex_colors
         attribute = made.color_attributes.new(VERTEX_COLORS, "BYTE_COLOR", "POINT")
         attribute.data.foreach_set("color_srgb", colors.ravel())
+    if needs.occlusion:
+        # What nobody cast rays for is open: an attribute that is missing would be black.
+        openness = np.ones(len(vertices)) if mesh.openness is None else mesh.openness
+        made.attributes.new(OPENNESS, "FLOAT", "POINT").data.foreach_set("value", openness.astype(np.float32))
     made.update(calc_edges=True)
     for material in mesh.materials:
         made.materials.append(
-            build_material(
-                material,
-                preset,
-                has_vertex_colors=mesh.vertex_colors is not None,
-                environment=environment,
-            )
+            build_material(material, fast, has_vertex_colors=mesh.vertex_colors is not None)
         )
     return bpy.data.objects.new(name, made)
 

@@ -65,7 +65,9 @@ from generator.messages import (  # noqa: E402
     from_json,
     to_json,
 )
+from generator.plan.passes import PAINTED  # noqa: E402
 from generator.plan.render_settings import PLAIN  # noqa: E402
+from generator.registries import PASSES  # noqa: E402
 
 MAX_IMPORT_MIB = 8192
 """What a file may unpack to that is larger than it looks, of which its importer believes what it says."""
@@ -103,17 +105,30 @@ class RenderWorker:
             self._loaded = wanted
         assert self._images is not None
         self._images.wear(one.package for worn in order.worn for one in worn)
+        if order.passes:
+            self._render_passes(self._images, order, answer)
+            return
         for place, view in enumerate(order.views):
             path = Path(order.out) / f"{place:06d}.{order.format}"
             environment = order.lights[place] if order.lights else None
             worn = order.worn[place] if order.worn else ()
-            if order.passes:
-                self._images.render_passes(view, path, order.passes, worn)
-            elif view.look.backdrop != PLAIN:
+            if view.look.backdrop != PLAIN:
                 path = path.with_suffix(".exr")
                 self._images.render_over_nothing(view, path, environment, worn)
             else:
                 self._images.render(view, path, environment, worn)
+            answer(Rendered(place, str(path)))
+
+    def _render_passes(self, images: Images, order: RenderOrder, answer: Answer) -> None:
+        """All views' passes of one kind and then of the other: each kind has a stage of its own."""
+        painted = [name for name in order.passes if PASSES.get(name).switch == PAINTED]
+        paths = [Path(order.out) / f"{place:06d}.{order.format}" for place in range(len(order.views))]
+        worn = order.worn or ((),) * len(order.views)
+        for view, path, things in zip(order.views, paths, worn, strict=True):
+            images.render_passes(view, path, order.passes, things)
+        for place, (view, path, things) in enumerate(zip(order.views, paths, worn, strict=True)):
+            if painted:
+                images.render_painted(view, path, painted, things)
             answer(Rendered(place, str(path)))
 
     def _convert(self, order: ConvertOrder) -> None:

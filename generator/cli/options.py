@@ -93,7 +93,10 @@ def _parts(flag: str, group: list[Setting], value: Any) -> list[Any]:
     if group[0].kind is str and group[0].info.varies:
         return [value] * len(group)
     if all(setting.info.varies for setting in group) and is_distribution(value):
-        return _distributions(flag, group, value)
+        numbers_of_one = get_args(_inner(group[0].kind))
+        if numbers_of_one:
+            return [_distributions(flag, [group[0].key] * len(numbers_of_one), value)]
+        return _distributions(flag, [setting.key for setting in group], value)
     if len(group) > 1 and len({setting.section for setting in group}) == 1:
         parts = numbers(flag, value)
         if len(parts) != len(group):
@@ -101,20 +104,20 @@ def _parts(flag: str, group: list[Setting], value: Any) -> list[Any]:
             raise UsageError(f"{flag} {value!r}: expected {len(group)} numbers, such as {example}")
         return list(parts)
     kind = _inner(group[0].kind)
-    if group[0].info.varies and isinstance(value, str):
-        [value] = _one_number(flag, value)
     if get_origin(kind) is tuple and isinstance(value, str):
         value = value.split(",") if str in get_args(kind) else numbers(flag, value)
+    elif group[0].info.varies and isinstance(value, str):
+        [value] = _one_number(flag, value)
     return [value] * len(group)
 
 
-def _distributions(flag: str, group: list[Setting], text: str) -> list[Any]:
-    """A number or a distribution for each setting of a flag, with semicolons between them."""
+def _distributions(flag: str, names: list[str], text: str) -> list[Any]:
+    """A number or a distribution for each name, with semicolons between them."""
     parts = text.split(";")
-    if len(parts) != len(group):
-        said = " and ".join(setting.key for setting in group)
+    if len(parts) != len(names):
+        said = " and ".join(dict.fromkeys(names))
         raise UsageError(
-            f"{flag} {shortened(repr(text))}: expected {len(group)} parts with ; between: {said}"
+            f"{flag} {shortened(repr(text))}: expected {len(names)} parts with ; between: {said}"
         )
     return [part if is_distribution(part) else _one_number(flag, part)[0] for part in parts]
 
@@ -140,7 +143,8 @@ def _parameter(flag: str, group: list[Setting], defaults: Mapping[str, Any]) -> 
     elif len(group) > 1 and len({s.section for s in group}) == 1:
         kind, metavar = str, ",".join(s.key.upper().removesuffix("_DEG").split("_")[-1] for s in group)
     elif first.info.varies:
-        kind, metavar = str, "TEXT|choice:A,B" if kind is str else "NUMBER|DISTRIBUTION"
+        several = "S" if get_origin(kind) is tuple else ""
+        kind, metavar = str, "TEXT|choice:A,B" if kind is str else f"NUMBER{several}|DISTRIBUTION{several}"
     elif get_origin(kind) is tuple:
         kind = list[str] if str in get_args(kind) and not first.choices else str
     elif get_origin(kind) is not None:  # a Literal of texts

@@ -3,20 +3,23 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from generator.cli.console import BlenderOption, say
+from generator.cli.console import BlenderOption, JsonFlag, say
 from generator.cli.options import numbers, with_settings
 from generator.errors import UsageError
 from generator.plan.config import load_config
 from generator.plan.setting import Setting
-from generator.plan.settings import Values, all_settings
+from generator.plan.settings import Values, all_settings, value_text
 
 DEFAULTS = {"render.preset": "quality", "render.resolution": 512}
 """Of a picture that somebody looks at."""
+
+_OF_DRAWS = "poses.seed"
 
 _OF_MESHES = ("heads.units", "heads.up", "heads.forward", "heads.eye_distance_mm", "heads.without")
 
@@ -28,10 +31,15 @@ def preview(
     expression: Annotated[str | None, typer.Option(help="Which expression; default neutral.")] = None,
     landmarks: Annotated[bool, typer.Option(help="Draw the landmarks found.")] = True,
     blender: BlenderOption = None,
+    as_json: JsonFlag = False,
     *,
     overrides: Values,
 ) -> None:
-    """Render one head at one pose, with the landmarks drawn."""
+    """Render one head at one pose, with the landmarks drawn.
+
+    Where settings are distributions, as with --variety, it is the look that a build with the same --seed
+    draws for this head and pose, and what was drawn is listed.
+    """
     from generator.execution.preview.picture import render_preview
 
     angles = numbers("--pose", pose)
@@ -46,12 +54,19 @@ def preview(
         draw_landmarks=landmarks,
         blender=blender,
     )
-    say(f"{picture}: {found}")
+    if as_json:
+        facts = {"detected": found.detected, "notes": found.notes, "drawn": found.drawn}
+        typer.echo(json.dumps({"picture": str(picture), **facts}))
+        return
+    say(f"{picture}: {found.line}")
+    for key, value in found.drawn.items():
+        say(f"  {key:22}{value_text(value)}")
 
 
 def previewed() -> list[Setting]:
     """Settings that a single picture has."""
-    return [s for s in all_settings() if s.section in ("render", "landmarks") or s.name in _OF_MESHES]
+    others = (*_OF_MESHES, _OF_DRAWS)
+    return [s for s in all_settings() if s.section in ("render", "landmarks") or s.name in others]
 
 
 def register(app: typer.Typer) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError
-from generator.heads.labels import SKIN
 from generator.heads.tiling import EXTEND
+from generator.labels import SKIN
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class Material:
     tint: linear factors of the texture. vertex_tint: vertex colours are factors
     of the texture, too. wrap: how the texture goes on beyond 0-1, see
     :mod:`generator.heads.tiling`.
-    label: what it is, of :data:`generator.heads.labels.LABELS`.
+    label: what it is, of :data:`generator.labels.LABELS`. label_map: an image beside the texture, whose
+    bytes say it texel by texel, as places in LABELS.
     gloss: 0 is matt, 1 reflects as glass or a wet eye does. opacity: share of what is behind that it hides,
     such as a lens of glasses.
     """
@@ -36,6 +37,7 @@ class Material:
     vertex_tint: bool = False
     wrap: str = EXTEND
     label: str = SKIN
+    label_map: Path | None = None
     gloss: float = 0.0
     opacity: float = 1.0
 
@@ -50,6 +52,8 @@ class HeadMesh:
     uv               float32 [T, 3, 2] per triangle corner, v up; None without texture
     vertex_colors    float32 [V, 3] sRGB 0-1; None where there are none
     material_index   int32 [T] into materials
+    openness         float32 [V] 0-1, the light from everywhere that reaches a vertex; None where nobody
+                     asked, see generator.landmarks.occlusion
     problems         what the reader noticed and could work around, a line each
     """
 
@@ -60,6 +64,7 @@ class HeadMesh:
     material_index: np.ndarray
     materials: tuple[Material, ...]
     problems: tuple[str, ...] = ()
+    openness: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         count, faces = len(self.vertices), len(self.triangles)

@@ -27,6 +27,7 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
             "vertex_tint": m.vertex_tint,
             "wrap": m.wrap,
             "label": m.label,
+            "label_map": str(m.label_map) if m.label_map else None,
             "gloss": m.gloss,
             "opacity": m.opacity,
         }
@@ -42,6 +43,8 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
         arrays["uv"] = mesh.uv
     if mesh.vertex_colors is not None:
         arrays["vertex_colors"] = mesh.vertex_colors
+    if mesh.openness is not None:
+        arrays["openness"] = mesh.openness
     np.savez(path, **arrays)
 
 
@@ -61,6 +64,7 @@ def load_package(path: Path) -> HeadMesh:
                 m.get("vertex_tint", Material.vertex_tint),
                 m.get("wrap", Material.wrap),
                 m.get("label", Material.label),
+                Path(m["label_map"]) if m.get("label_map") else None,
                 m.get("gloss", Material.gloss),
                 m.get("opacity", Material.opacity),
             )
@@ -73,4 +77,5 @@ def load_package(path: Path) -> HeadMesh:
             vertex_colors=data["vertex_colors"] if "vertex_colors" in data else None,
             material_index=data["material_index"],
             materials=materials,
+            openness=data["openness"] if "openness" in data else None,
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strips and fans as triangles."""
+"""Strips and fans as triangles, and the normals of triangles' vertices."""
 
 from __future__ import annotations
 
@@ -41,3 +41,16 @@ def of_polygons(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     step = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
     corners = np.stack([first, first + step + 1, first + step + 2], axis=1)
     return corners, np.repeat(np.arange(len(counts)), triangles)
+
+
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Area-weighted unit normals [V, 3] and a third of the surrounding area [V]; zero where unused."""
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    cross = np.cross(b - a, c - a) / 2
+    corner = triangles.ravel()
+    per_corner = np.repeat(cross, 3, axis=0)
+    count = len(vertices)
+    sums = np.stack([np.bincount(corner, per_corner[:, k], minlength=count) for k in range(3)], axis=1)
+    areas = np.bincount(corner, np.linalg.norm(per_corner, axis=1), minlength=count) / 3
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.divide(sums, length, out=np.zeros_like(sums), where=length > 0), areas

@@ -99,6 +99,11 @@ class Surface:
         distances = ((points - origins) * directions).sum(1) / squared
         return Hits(triangles, weights, points, np.where(triangles < 0, np.inf, distances))
 
+    def blocked(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Which rays meet the surface, bool [N]; what is cut out lets them through. float [N, 3] twice."""
+        found = self._scene.run(origins.astype(np.float32), directions.astype(np.float32))
+        return (found >= 0) & ~self._may_be_hole[found]
+
     def points(self, triangles: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Points of (triangle, barycentric weights). int [N], float [N, 3] -> float64 [N, 3]."""
         corners = self.vertices[self.triangles[triangles]]

@@ -47,7 +47,8 @@ from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 class BuildConfig:
     """Everything that decides a dataset's content, and nothing else.
 
-    drawn: by "section.key", what a setting is drawn from; the setting itself then holds the middle.
+    drawn: by "section.key", what a setting is drawn from; the setting itself then holds the middle. By
+    "section.key.place" where the setting has several numbers, of which each may be drawn.
     base: where relative paths count from: the folder of the configuration file, the working
     directory for flags.
     """
@@ -64,8 +65,11 @@ class BuildConfig:
         """Plain values for JSON, section by section; distributions as they are written."""
         values = {name: plain_values(getattr(self, name)) for name in SECTIONS}
         for name, distribution in self.drawn.items():
-            section, _, key = name.partition(".")
-            values[section][key] = distribution.text
+            section, key, *place = name.split(".")
+            if place:
+                values[section][key][int(place[0])] = distribution.text
+            else:
+                values[section][key] = distribution.text
         return values
 
     @property
@@ -154,6 +158,14 @@ def config_toml(config: BuildConfig) -> str:
     )
 
 
+def drawn_in(values: Mapping[str, Any], where: object) -> dict[str, Distribution]:
+    """By "section.key", what the settings of a configuration are drawn from, whatever else it holds.
+
+    where: what messages call it. Raises UsageError: a distribution is none.
+    """
+    return _split(plain(dict(values)), where)[1]
+
+
 def differences(ours: BuildConfig, theirs: BuildConfig) -> dict[str, str]:
     """ "section.key" -> "section.key: theirs -> ours" of each setting that differs."""
     found = {}
@@ -234,17 +246,29 @@ def _split(values: dict[str, Any], where: object) -> tuple[dict[str, Any], dict[
         table = values.get(setting.section)
         if not (setting.info.varies and isinstance(table, dict)):
             continue
-        given, of_texts = str(table.get(setting.key, "")), setting.kind is str
-        if not (is_choice(given) if of_texts else is_distribution(given)):
+        given, of_several = table.get(setting.key), get_origin(setting.kind) is tuple
+        if setting.key not in table or of_several != isinstance(given, list):
             continue
-        try:
-            low, high = setting.info.low, setting.info.high
-            found = parse_choice(given) if of_texts else parse_distribution(given, low, high)
-        except ValueError as error:
-            raise UsageError(f"{where}: {setting.name}: {shortened(str(error))}") from error
-        drawn[setting.name] = found
-        values = {**values, setting.section: {**values[setting.section], setting.key: found.middle}}
+        parts: list[Any] = list(given or ()) if of_several else [given]
+        for place, part in enumerate(parts):
+            if (found := _distribution(setting, part, where)) is not None:
+                drawn[f"{setting.name}.{place}" if of_several else setting.name] = found
+                parts[place] = found.middle
+        middle = parts if of_several else parts[0]
+        values = {**values, setting.section: {**values[setting.section], setting.key: middle}}
     return values, drawn
+
+
+def _distribution(setting: Setting, given: Any, where: object) -> Distribution | None:
+    """The distribution that stands where a value may; None for a value."""
+    of_texts = setting.kind is str
+    if not (is_choice(given) if of_texts else is_distribution(given)):
+        return None
+    try:
+        low, high = setting.info.low, setting.info.high
+        return parse_choice(given) if of_texts else parse_distribution(given, low, high)
+    except ValueError as error:
+        raise UsageError(f"{where}: {setting.name}: {shortened(str(error))}") from error
 
 
 @lru_cache(maxsize=16)

@@ -8,13 +8,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from generator.labels import LABELS
+
+PAINTED = ""
+"""The switch of passes that are rendered with materials of their own."""
+
+PAINTED_SAMPLES = 16
+"""Of which each pixel of theirs is the mean."""
+
 
 @dataclass(frozen=True)
 class Pass:
     """One pass.
 
     name: of its layer in our files.
-    switch: the property of Blender's view layer that turns it on; the same in Blender 4.2 to 5.x.
+    switch: the property of Blender's view layer that turns it on; the same in Blender 4.2 to 5.x. PAINTED:
+        it is painted, with materials that show it instead of light, and averaged over the pixel.
     layers: what Blender calls its layer: 4.x, then 5.x where it differs.
     channels: of our layer. axes: for each of them, the names that Blender's channel may have.
     turned: x, y, z are turned from Blender's frame B to frame C.
@@ -86,3 +95,31 @@ OBJECT_INDEX = Pass(
     empty=0.0,
 )
 """Always rendered: where it is 0 there is no surface."""
+
+
+BACKGROUND = "background"
+
+ALBEDO = Pass(
+    "albedo",
+    PAINTED,
+    (),
+    ("R", "G", "B"),
+    (),
+    "colour of the surface without light, linear, mean over the pixel's share that is covered",
+)
+SEGMENTATION = Pass(
+    "segmentation",
+    PAINTED,
+    (),
+    (BACKGROUND, *LABELS),
+    (),
+    "share of the pixel that each class covers, 0 to 1; they add up to 1",
+)
+
+LABELS_A_PICTURE = 3
+"""Classes that one picture of the render worker tells apart: by red, green and blue."""
+
+
+def painted_file(stem: str, name: str, group: int = 0) -> str:
+    """Name of the picture of a painted pass beside the multilayer file. group: of its classes."""
+    return f"{stem}.{name}{group}.exr"

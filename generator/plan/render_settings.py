@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from generator.plan.setting import Choice, setting
+from generator.plan.shading import Shading
 from generator.plan.variety import CHOICES, NONE
 from generator.plan.wear import Wear
 
@@ -124,7 +125,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Look(Wear, Sensor):
+class Look(Wear, Shading, Sensor):
     """What an image looks like, besides head, pose and camera. Of one image: part of a View."""
 
     preset: str = setting(
@@ -152,7 +153,7 @@ class Look(Wear, Sensor):
     )
     background: tuple[float, float, float] = setting(
         (0.5, 0.5, 0.5), "R,G,B of what is behind the head, sRGB between 0 and 1", low=0, high=1,
-        label="Background",
+        label="Background", varies=True, since="1.3.0",
     )  # fmt: skip
     environment: str = setting(
         NOTHING, "Which high-dynamic-range panorama lights the head, by its name: one of Blender's, or of "

@@ -40,7 +40,8 @@ class Info:
                [heads] and [poses] decide is in the head's files, its placement and the poses)
     path       of a file or folder; a relative one counts from the configuration file
     varies     it may be a distribution, of which each image or each head draws; see
-               :mod:`generator.plan.distribution`. Of numbers and texts in the sections of a view
+               :mod:`generator.plan.distribution`. Of numbers and texts in the sections of a view; of so
+               many numbers, each may be one
     since      schema version of the column ``look_...`` that holds what was drawn
     """
 

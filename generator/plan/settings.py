@@ -256,6 +256,13 @@ def beyond_defaults(values: Values, wanted: Callable[[Setting], bool]) -> dict[s
     return found
 
 
+def value_text(value: Any) -> str:
+    """A value for people."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(value_text, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
 def plain(value: Any) -> Any:
     """A value as JSON has it: lists for tuples."""
     return [plain(item) for item in value] if isinstance(value, (list, tuple)) else value

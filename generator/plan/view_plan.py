@@ -16,7 +16,7 @@ from generator.plan.distribution import Distribution
 from generator.plan.draws import draw_seed
 from generator.plan.poses import pose_name
 from generator.plan.render_settings import NOISE
-from generator.plan.settings import Lens, Poses, Render
+from generator.plan.settings import Lens, Poses, Render, plain
 from generator.plan.views import Pose, View, Views
 
 Draw = Callable[[View, np.random.Generator], View]
@@ -105,8 +105,19 @@ def drawn_render(config: Planned, head: str, pose: Pose) -> Render:
     for name, distribution in config.drawn.items():
         whose = (head,) if distribution.per_head else (head, pose_name(*pose))
         rng = np.random.default_rng(draw_seed(config.poses.seed, name, *whose))
-        values[name.partition(".")[2]] = distribution.draw(rng)
+        _, key, *place = name.split(".")
+        value: Any = distribution.draw(rng)
+        if place:
+            numbers, k = values.get(key, getattr(config.render, key)), int(place[0])
+            value = (*numbers[:k], value, *numbers[k + 1 :])
+        values[key] = value
     return replace(config.render, **values)
+
+
+def drawn_values(config: Planned, head: str, pose: Pose) -> dict[str, Any]:
+    """What was drawn for one image, by the key of its setting, as JSON has it. See :func:`drawn_render`."""
+    found = drawn_render(config, head, pose)
+    return {key: plain(getattr(found, key)) for key in dict.fromkeys(n.split(".")[1] for n in config.drawn)}
 
 
 def view_seed(seed: int, head: str, pose: Pose) -> int:

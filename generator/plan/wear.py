@@ -14,7 +14,20 @@ OWN, NOTHING = "own", "none"
 """As the head has it; nothing."""
 
 STYLES: dict[str, tuple[str, ...]] = {
-    "hair": (OWN, "short"),
+    "hair": (
+        OWN,
+        "buzz",
+        "short",
+        "parted",
+        "slick",
+        "fringe",
+        "bob",
+        "long",
+        "curly",
+        "afro",
+        "bun",
+        "ponytail",
+    ),
     "brows": (OWN, "natural"),
     "beard": (OWN, "full"),
     "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.heads.labels import GLASSES
 from generator.heads.mesh import HeadMesh, Material
+from generator.labels import GLASSES
 from generator.plan.wear import NOTHING
 from generator.worn.colours import ACETATE, METAL, Colour, drawn, luminance, mottled
 from generator.worn.face import Face

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from generator.geometry.rotation import graphics_rotation, rotation_from_angles
-from generator.heads.labels import OCCLUDER
 from generator.heads.mesh import Material
+from generator.labels import OCCLUDER
 from generator.worn.blend import Cones, skin_of
 from generator.worn.colours import CLOTH, SKIN, drawn
 from generator.worn.shapes import Part, Shape, ball, limb

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.heads.labels import HEADWEAR
 from generator.heads.mesh import Material
+from generator.labels import HEADWEAR
 from generator.worn.colours import CLOTH, Colour, drawn, luminance
 from generator.worn.crown import Crown, crown_of, ear_top, forehead
 from generator.worn.face import Face

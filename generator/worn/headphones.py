@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.heads.labels import HEADWEAR
 from generator.heads.mesh import HeadMesh, Material
+from generator.labels import HEADWEAR
 from generator.plan.wear import NOTHING, OWN
 from generator.worn.colours import Colour, drawn
 from generator.worn.face import Face

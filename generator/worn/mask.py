@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.heads.labels import MASK
 from generator.heads.mesh import HeadMesh, Material
+from generator.labels import MASK
 from generator.worn.colours import CLOTH, Colour, drawn
 from generator.worn.face import Face
 from generator.worn.fit import Fit, Kind

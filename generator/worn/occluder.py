@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from generator.geometry.rotation import graphics_rotation, rotation_from_angles
-from generator.heads.labels import OCCLUDER
 from generator.heads.mesh import HeadMesh, Material
+from generator.labels import OCCLUDER
 from generator.worn.colours import ACETATE, CLOTH, drawn
 from generator.worn.face import Face
 from generator.worn.fit import Fit, Kind

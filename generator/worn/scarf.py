@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from generator.heads.labels import HEADWEAR
 from generator.heads.mesh import Material
+from generator.labels import HEADWEAR
 from generator.worn.colours import CLOTH, drawn
 from generator.worn.face import FAR_MM, Face
 from generator.worn.fit import CannotWear

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from known_error import build_known
 from small_dataset import HEADS, SMALL_PLAN, build_dataset, unit_rows
+from varied_looks import build_varied
 
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.unit_rows import UnitRows
@@ -43,3 +44,9 @@ def dataset(tmp_path: Path, _template: Path) -> Path:
 def known(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A dataset whose detector is off by a known error; nobody changes it."""
     return build_known(tmp_path_factory.mktemp("known") / "dataset")
+
+
+@pytest.fixture(scope="session")
+def varied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset whose looks are drawn; nobody changes it."""
+    return build_varied(tmp_path_factory.mktemp("varied") / "dataset")

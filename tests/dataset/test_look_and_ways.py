@@ -21,7 +21,14 @@ NAN = float("nan")
 
 
 @pytest.mark.parametrize(
-    ("column", "value"), [("look_ambient", 0.9), ("look_ambient", NAN), ("look_backdrop", "")]
+    ("column", "value"),
+    [
+        ("look_ambient", 0.9),
+        ("look_ambient", NAN),
+        ("look_backdrop", ""),
+        ("look_background", [0.5, 0.5, 0.6]),
+        ("look_background", [0.5, NAN, 0.5]),
+    ],
 )
 def test_a_look_that_was_not_planned_is_found(dataset: Path, column: str, value: object) -> None:
     """Also where a single row says nothing, as all of an older part may."""

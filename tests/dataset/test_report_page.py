@@ -130,6 +130,40 @@ def test_what_a_browser_shows_is_what_the_table_says(known, chromium, tmp_path, 
     assert seen["tiles"] == 2 * 9
 
 
+VARIETY_PROBE = """<script>addEventListener("load", () => {
+  const seen = { wide: document.documentElement.scrollWidth, window: innerWidth, factors: {}, tiles: 0 };
+  for (const card of document.querySelectorAll(".factor")) {
+    const numbers = (picked) => [...card.querySelectorAll(picked)].map((node) => node.dataset);
+    seen.factors[card.dataset.factor] = { bars: numbers(".bars i").map((d) => Number(d.rows)),
+      parts: Object.fromEntries(numbers(".rate").map((d) => [d.part, [Number(d.rows), d.value]])),
+      missed: card.querySelectorAll(".missed").length };
+  }
+  const out = document.createElement("pre"); out.id = "probe";
+  out.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(seen)))); document.body.append(out);
+});</script>"""
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_what_varies_is_shown_with_its_share_of_faces_found(varied, chromium, tmp_path, width):
+    page = tmp_path / "r.html"
+    write_report(varied, page)
+    text = page.read_text(encoding="utf-8").replace("</body>", VARIETY_PROBE + "</body>")
+    page.write_text(FRAME.format(width=width, page=html.escape(text)), encoding="utf-8")
+    shown = browse(chromium, page, tmp_path, "--window-size=1500,1000", "--dump-dom")
+    assert "CONSOLE" not in shown.stderr, shown.stderr
+    probe = re.search(r'<pre id="seen">([^<]+)</pre>', shown.stdout)
+    assert probe, shown.stderr
+    seen = json.loads(base64.b64decode(probe.group(1)))
+    assert seen["wide"] <= seen["window"] == width
+    table = pq.read_table(varied / "data").to_pylist()
+    plain = [row["detected"] for row in table if row["look_backdrop"] == "plain"]
+    backdrop = seen["factors"]["backdrop"]
+    rows, share = backdrop["parts"]["plain"]
+    assert rows == len(plain) and float(share) == pytest.approx(sum(plain) / len(plain))
+    assert backdrop["bars"] == [rows, len(table) - rows] and backdrop["missed"] > 0
+    assert "ambient" in seen["factors"] and len(seen["factors"]) == 6
+
+
 def distance(row: dict) -> float:
     """Mean distance of the detected landmarks from the exact ones, pixels, from the labels alone."""
     r = Rotation.from_euler("XYZ", [-row["pitch_deg"], row["yaw_deg"], row["roll_deg"]], degrees=True)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pyarrow.parquet as pq
 import pytest
 from dry_build import DRAWN, DryBuild
 
@@ -89,6 +90,15 @@ def test_from_own_draws_to_the_same_only_when_that_was_agreed_to(dry: DryBuild) 
         dry.build(poses=SAME)
     dry.build(poses=SAME, confirm=lambda what: True)
     assert dry.poses_of("amy") == dry.poses_of("bob")
+    dry.check()
+
+
+def test_colours_behind_heads_are_drawn_recorded_and_proved(dry: DryBuild) -> None:
+    dry.build(render={"background": ["uniform:0,1", 0.25, "head:uniform:0,1"]})
+    table = pq.read_table(dry.root / "data", columns=["subject", "look_background"]).to_pylist()
+    red, green, blue = zip(*(row["look_background"] for row in table), strict=True)
+    assert len(set(red)) == len(table) and set(green) == {0.25}
+    assert len(set(zip((row["subject"] for row in table), blue, strict=True))) == 2
     dry.check()
 
 

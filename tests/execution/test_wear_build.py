@@ -15,8 +15,8 @@ from small_builds import config_for, run
 from generator.dataset.format.open import as_array
 from generator.dataset.proof.verify import verify_dataset
 from generator.errors import UsageError
-from generator.heads.labels import GLASSES, OCCLUDER
 from generator.heads.mesh import HeadMesh, Material
+from generator.labels import GLASSES, OCCLUDER
 from generator.picture.settled import settled
 from generator.plan.wear import STYLES
 from generator.registries import WORN

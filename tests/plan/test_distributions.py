@@ -130,6 +130,34 @@ def test_a_draw_a_head_is_the_same_for_all_its_images() -> None:
     assert len(looks) == 1 and other not in looks
 
 
+def test_each_number_of_a_colour_may_be_drawn() -> None:
+    ours = config(background=["uniform:0,1", 0.25, "head:choice:0.1,0.9"])
+    assert ours.render.background == (0.5, 0.25, 0.1), "the middle"
+    assert ours.as_dict()["render"]["background"] == ["uniform:0,1", 0.25, "head:choice:0.1,0.9"]
+    red, green, blue = zip(
+        *(v.look.background for v in plan_views(ours, "amy/neutral", 120.0, POSES)), strict=True
+    )
+    assert len(set(red)) == len(POSES) and set(green) == {0.25} and len(set(blue)) == 1
+    alone = config(background=["uniform:0,1", "uniform:0,1", 0.5])
+    views = plan_views(alone, "amy/neutral", 120.0, POSES)
+    assert tuple(view.look.background[0] for view in views) == red, "whatever else is drawn"
+    assert all(view.look.background[0] != view.look.background[1] for view in views)
+
+
+@pytest.mark.parametrize(
+    ("background", "said"),
+    [
+        (["uniform:0,2", 0, 0], "render.background: 2 is outside what the setting may be, from 0 to 1"),
+        (["uniform:0,1", 0], "render.background.2: Field required"),
+        ("uniform:0,1", "render.background: Input should be a valid tuple, got 'uniform:0,1'"),
+    ],
+)
+def test_what_is_no_colour_is_said_in_one_line(background: Any, said: str) -> None:
+    with pytest.raises(UsageError) as error:
+        config(background=background)
+    assert str(error.value) == f"configuration: {said}"
+
+
 def test_with_zoom_a_head_fits_at_any_distance() -> None:
     ours = config(distance_mm="log-uniform:400,8000", zoom=True)
     for view in plan_views(ours, "amy/neutral", 120.0, POSES):
@@ -168,6 +196,11 @@ def test_the_head_stands_where_it_is_shifted_to() -> None:
         ({"--lens": "50"}, {"lens_mm": 50.0}),
         ({"--lens": "uniform:28,135"}, {"lens_mm": "uniform:28,135"}),
         ({"--light": "10,20"}, {"light_yaw_deg": 10.0, "light_pitch_deg": 20.0}),
+        ({"--background": "0.1,0.2,0.3"}, {"background": [0.1, 0.2, 0.3]}),
+        (
+            {"--background": "uniform:0,1;0.5;choice:0,1"},
+            {"background": ["uniform:0,1", 0.5, "choice:0,1"]},
+        ),
         (
             {"--light": "uniform:-60,60;20"},
             {"light_yaw_deg": "uniform:-60,60", "light_pitch_deg": 20.0},
@@ -184,6 +217,7 @@ def test_options_take_numbers_and_distributions(given_: dict[str, str], expected
         ("--lens", "wide", "expected numbers separated by commas"),
         ("--lens", "50,85", "expected a number, or a distribution such as uniform:1,2"),
         ("--light", "uniform:-60,60", "expected 2 parts with ; between: light_yaw_deg and light_pitch_deg"),
+        ("--background", "uniform:0,1", "expected 3 parts with ; between: background"),
     ],
 )
 def test_options_that_are_neither_are_said(flag: str, text: str, said: str) -> None:

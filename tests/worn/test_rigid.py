@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from where import SOURCES, behind_front_mm, covers, of_material
 
-from generator.heads.labels import GLASSES, HEADWEAR, MASK, OCCLUDER
 from generator.heads.mesh import HeadMesh
+from generator.labels import GLASSES, HEADWEAR, MASK, OCCLUDER
 from generator.plan.wear import LENSES, STYLES
 from generator.registries import WORN
 from generator.worn.face import Face

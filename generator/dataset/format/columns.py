@@ -158,10 +158,11 @@ def _look_column(name: str, key: str) -> Column:
     [known] = [one for one in section_settings("look", Look) if one.key == key]
     unit = f", {known.info.unit}" if known.info.unit else ""
     meaning = f"{known.info.help[0].lower()}{known.info.help[1:]}{unit}"
-    of_texts = known.kind is str
+    of_texts, several = known.kind is str, len(get_args(known.kind))
+    numbers = list_of(pa.float64(), several) if several else pa.float64()
     return Column(
         name,
-        pa.string() if of_texts else pa.float64(),
+        pa.string() if of_texts else numbers,
         meaning,
         "look",
         lambda rows: rows.of_looks(lambda look: getattr(look, key)),

@@ -7,7 +7,7 @@ Linear, frame C, metres; see docs/passes.md.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,21 @@ import numpy as np
 from generator.dataset.format.files import one_line
 from generator.errors import DatasetError, UsageError, WorkerError
 from generator.exr_header import check_exr
-from generator.plan.passes import OBJECT_INDEX, Pass
+from generator.labels import LABELS
+from generator.plan.passes import (
+    ALBEDO,
+    LABELS_A_PICTURE,
+    OBJECT_INDEX,
+    PAINTED,
+    SEGMENTATION,
+    Pass,
+    painted_file,
+)
 from generator.process import native_silence
 from generator.registries import PASSES
+
+COVERAGE = 1e-3
+"""How near the classes of a pixel add up to what they cover."""
 
 _HEADER = {
     "headturn.frame": "C (camera): x image-right, y image-down, z into the scene",
@@ -38,6 +50,9 @@ def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -
     made: dict[str, np.ndarray] = {}
     for name in passes:
         wanted: Pass = PASSES.get(name)
+        if wanted.switch == PAINTED:
+            made |= PAINTERS[name](path)
+            continue
         values = _layer(wanted, layers, path)
         if wanted.turned:
             x, y, z = np.moveaxis(values, -1, 0)
@@ -48,6 +63,46 @@ def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -
         for place, channel in enumerate(wanted.channel_names):
             made[channel] = np.ascontiguousarray(values[..., place])
     return made
+
+
+def _albedo(path: Path) -> dict[str, np.ndarray]:
+    """Colour without light where there is a surface: rendered over nothing it is multiplied by coverage."""
+    *color, cover = _painted(path.with_name(painted_file(path.stem, ALBEDO.name)))
+    there = cover > 0
+    mean = [np.where(there, value / np.where(there, cover, 1), np.float32(np.nan)) for value in color]
+    return dict(zip(ALBEDO.channel_names, mean, strict=True))
+
+
+def _segmentation(path: Path) -> dict[str, np.ndarray]:
+    """Share of each pixel that each class covers. Raises WorkerError where they do not add up."""
+    classes: list[np.ndarray] = []
+    groups = range(len(LABELS) // LABELS_A_PICTURE)
+    files = [path.with_name(painted_file(path.stem, SEGMENTATION.name, group)) for group in groups]
+    pictures = [_painted(file) if file.exists() else None for file in files]
+    found = [picture for picture in pictures if picture]
+    if not found:
+        raise WorkerError(f"{path}: the render worker left no segmentation")
+    total = found[0][-1]
+    for picture in pictures:
+        classes += picture[:-1] if picture else [np.zeros_like(total)] * LABELS_A_PICTURE
+    if np.abs(sum(classes) - total).max() > COVERAGE:
+        raise WorkerError(f"{path}: a class of the segmentation is missing")
+    return dict(zip(SEGMENTATION.channel_names, [1 - total, *classes], strict=True))
+
+
+PAINTERS: dict[str, Callable[[Path], dict[str, np.ndarray]]] = {
+    ALBEDO.name: _albedo,
+    SEGMENTATION.name: _segmentation,
+}
+"""How painted passes are read."""
+
+
+def _painted(path: Path) -> list[np.ndarray]:
+    """R, G, B and A of what a render worker painted, float32 [H, W]; the file is removed."""
+    layers = _layers(read_channels(path))
+    path.unlink()
+    [channels] = layers.values()
+    return [channels[name].astype(np.float32) for name in "RGBA"]
 
 
 def _layer(wanted: Pass, layers: Mapping[str, Mapping[str, np.ndarray]], path: Path) -> np.ndarray:

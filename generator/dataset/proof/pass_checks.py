@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +15,7 @@ from generator.dataset.format.row_cameras import RowCameras
 from generator.dataset.format.schema import passes_path
 from generator.dataset.proof.context import RowContext
 from generator.errors import DatasetError, UsageError
-from generator.plan.passes import DEPTH, POSITION
+from generator.plan.passes import DEPTH, POSITION, SEGMENTATION
 
 PROJECTION_PX = 0.01
 """How near the position of a pixel must be projected to the pixel's centre."""
@@ -27,6 +27,9 @@ float32 in the ray tracer. One pixel in three million was."""
 DEPTH_MM = 1.0
 """How far a landmark may lie outside the depths of the pixels around it. Rays see edges and
 lashes that are thinner than a pixel; a pixel does not."""
+
+SUM = 1e-3
+"""How near the classes of a pixel must add up to 1."""
 
 MAX_DISAGREEING = 0.01
 """Share of a row's landmarks for which ray cast and depth may differ, for the same reason."""
@@ -67,11 +70,28 @@ def pass_problems(batch: pa.RecordBatch, context: RowContext) -> Iterator[str]:
             off = projection_error_px(position, camera)
             if not off <= PROJECTION_PX:
                 yield f"{path}: positions do not project onto their own pixels (off by {off:.3g} px)"
+        if set(SEGMENTATION.channel_names) <= set(channels) and (problem := segmentation_problem(channels)):
+            yield f"{path}: {problem}"
         if set(DEPTH.channel_names) <= set(channels):
             depth = channels[DEPTH.channel_names[0]] * 1e3
             wrong = disagreement(depth, exact[row], visible[row], camera)
             if wrong > MAX_DISAGREEING:
                 yield f"{path}: landmarks_visible and depth disagree on {wrong:.1%} of the landmarks"
+
+
+def segmentation_problem(channels: Mapping[str, np.ndarray]) -> str:
+    """What is wrong with the classes of an image, or "": shares outside 0 to 1, sums that are not 1, nothing
+    where the depth has a surface."""
+    classes = np.stack([channels[name] for name in SEGMENTATION.channel_names])
+    if not (np.isfinite(classes).all() and (classes >= -SUM).all()):
+        return "a share of the segmentation is below 0"
+    if np.abs(classes.sum(axis=0) - 1).max() > SUM:
+        return "the classes of the segmentation do not add up to 1"
+    if DEPTH.channel_names[0] in channels:
+        surface = np.isfinite(channels[DEPTH.channel_names[0]])
+        if (surface & (classes[0] > 1 - SUM)).mean() > SLIVERS:
+            return "the segmentation has nothing where the depth has a surface"
+    return ""
 
 
 def projection_error_px(position_mm: np.ndarray, camera: RowCameras) -> float:

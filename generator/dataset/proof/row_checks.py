@@ -98,7 +98,8 @@ def look_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
             said = as_array(batch, name)
             unsaid = np.isnan(said)
         if not unsaid.all():  # as in parts that are older than the column
-            yield from named(batch, said != expected, f"{name} is not what the configuration plans")
+            wrong = (said != expected).reshape(len(said), -1).any(axis=1)
+            yield from named(batch, wrong, f"{name} is not what the configuration plans")
 
 
 def landmark_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from generator.dataset.format.columns import ROWS, columns_at
 from generator.dataset.format.files import write_bytes
@@ -15,6 +16,7 @@ from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import dataset_topology
 from generator.dataset.format.schema import conventions
 from generator.dataset.show.column_tables import column_rows, markdown_table
+from generator.dataset.show.factors import factors_of
 from generator.escape import markdown, markdown_code
 from generator.landmarks.topology import FACE_MESH, Topology
 
@@ -78,9 +80,32 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topolog
         "## Reading\n\n" + _READING.rstrip(),
         "## Columns of data/\n\n" + markdown_table(("column", "type", "meaning"), columns),
         other_tables,
+        *variety_text(manifest.configuration),
         "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(conventions(topology).items())),
     ]
     return "\n\n".join(sections) + "\n"
+
+
+def variety_text(configuration: Mapping[str, Any]) -> list[str]:
+    """What a dataset draws as a table in Markdown, if it draws anything.
+
+    Raises UsageError as :func:`generator.dataset.show.factors.factors_of` does.
+    """
+    rows = [
+        (
+            factor.name,
+            markdown_code(factor.distribution.text),
+            factor.setting.info.unit,
+            "head" if factor.distribution.per_head else "image",
+            factor.setting.info.help,
+        )
+        for factor in factors_of(configuration)
+    ]
+    if not rows:
+        return []
+    table = markdown_table(("setting", "drawn from", "unit", "for every", "what it is"), rows)
+    told = "What was drawn for a row is in its columns `look_…`, `camera` and `translation_mm`."
+    return [f"## What varies\n\n{table}\n\n{told}"]
 
 
 def _front_matter(manifest: Manifest, heads: Sequence[HeadRow]) -> str:

@@ -26,6 +26,7 @@ from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
 from generator.errors import HeadError, WorkerError
+from generator.execution.lanes.labels import asks_labels, labelled_head
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.renderer import Renderer
 from generator.execution.lanes.shots import Shots
@@ -37,6 +38,7 @@ from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
 from generator.heads.surroundings import head_alone
 from generator.landmarks.detector import Detector, open_detector
+from generator.landmarks.occlusion import shades, with_occlusion
 from generator.landmarks.shared import SharedAnchors, packaged
 from generator.landmarks.surface import Surface
 from generator.messages import (
@@ -52,6 +54,7 @@ from generator.messages import (
 )
 from generator.picture.scenery import Folders
 from generator.placing.placer import Placer
+from generator.plan.passes import SEGMENTATION
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 from generator.process import resident_mib
@@ -86,7 +89,7 @@ class Lane:
             self._places = self._open_renderer("looks", options, None)
         self._wardrobe = Wardrobe(self._scratch / "worn")
         self._detectors: dict[Landmarks, Detector] = {}
-        self._loaded: tuple[Head, Placement] | None = None
+        self._loaded: tuple[Head, Placement, tuple[bool, bool]] | None = None
 
     def run(self, order: LaneOrder, on_image: OnImage) -> Receipt:
         """See :class:`generator.execution.lanes.options.AnyLane`."""
@@ -146,11 +149,13 @@ class Lane:
         """What a head that stands wears in some views, for a preview. mesh: as read."""
         if not any(look.wears for look in views.looks):
             return Outfits()
+        placed = placement.normalise(head_alone(mesh, placement))
+        return self._wardrobe.dress(head.name, placed, self.points(mesh, placement, landmarks), views)
+
+    def points(self, mesh: HeadMesh, placement: Placement, landmarks: Landmarks) -> np.ndarray:
+        """The anchors of a head that stands, for a preview: float64 [P, 3], frame C, mm. mesh: as read."""
         anchors = self.placer(landmarks).anchors(mesh, placement)
-        points = anchors.turned(graphics_rotation(placement.levelling))
-        return self._wardrobe.dress(
-            head.name, placement.normalise(head_alone(mesh, placement)), points, views
-        )
+        return anchors.turned(graphics_rotation(placement.levelling))
 
     def _open_renderer(self, folder: str, options: LaneOptions, blender: str | None) -> Renderer:
         images = self._scratch / folder
@@ -184,7 +189,7 @@ class Lane:
         seconds: dict[str, float] = {}
         views, detector = order.views, self.detector(order.landmarks)
         with _timed(seconds, "load"):
-            package = self._package(order.head, order.placement)
+            package = self._package(order)
         with _timed(seconds, "visibility"):
             if off := self._surface.off(order.anchors):
                 raise HeadError(
@@ -259,14 +264,25 @@ class Lane:
                 yield path.read_bytes(), passes_sha256(channels)
                 path.unlink()
 
-    def _package(self, head: Head, placement: Placement) -> Path:
+    def _package(self, order: BuildOrder) -> Path:
+        """The head of an order for its render worker; made once as long as it is the same."""
         package = self._scratch / "head.npz"
-        if (head, placement) != self._loaded:
+        head, placement = order.head, order.placement
+        by_texel = SEGMENTATION.name in order.passes
+        tells = (by_texel, by_texel or asks_labels(order.views))
+        known = (head, placement, tells) == self._loaded
+        if not known:
             self._loaded = None
-            mesh = placement.normalise(head_alone(self.read(head), placement))
+            self._mesh = placement.normalise(head_alone(self.read(head), placement))
+            self._surface = Surface(self._mesh)
+        if shades(order.views) and self._mesh.openness is None:
+            self._mesh, known = with_occlusion(self._mesh, self._surface), False
+        if not known:
+            mesh = self._mesh
+            if any(tells):
+                mesh = labelled_head(head, mesh, order.anchors, self._scratch if by_texel else None)
             save_package(mesh, package)
-            self._mesh, self._surface = mesh, Surface(mesh)
-            self._loaded = head, placement
+            self._loaded = head, placement, tells
         return package
 
 

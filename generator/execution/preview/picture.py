@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from generator.errors import DatasetError, HeadError, UsageError
+from generator.execution.lanes.labels import asks_labels, labelled_head
 from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions
 from generator.execution.lanes.scratch import scratch_folder
@@ -17,13 +20,30 @@ from generator.heads.head import NEUTRAL
 from generator.heads.package import save_package
 from generator.heads.source import find_heads
 from generator.heads.surroundings import head_alone
+from generator.landmarks.occlusion import shades, with_occlusion
 from generator.picture.scenery import folders_of
 from generator.picture.settled import settled
 from generator.plan.config import BuildConfig
-from generator.plan.view_plan import plan_views
+from generator.plan.view_plan import drawn_values, plan_views
 from generator.process import native_silence
 
 DOT = (80, 255, 80)
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What came of it. detected: was a face found? notes: all that is known about the head. drawn: what was
+    drawn for the picture, see :func:`generator.plan.view_plan.drawn_values`."""
+
+    detected: bool
+    notes: tuple[str, ...]
+    drawn: dict[str, Any]
+
+    @property
+    def line(self) -> str:
+        """Found or not, and what is to be said of the head."""
+        found = "landmarks found" if self.detected else "no face was found at this pose"
+        return f"{found} ({'; '.join(self.notes)})" if self.notes else found
 
 
 def render_preview(
@@ -34,12 +54,11 @@ def render_preview(
     expression: str | None = None,
     draw_landmarks: bool = True,
     blender: str | None = None,
-) -> str:
+) -> Preview:
     """Render the configured source's one subject at pose (yaw, pitch, roll) into picture.
 
-    Returns a line about what was found and all that is known about the head. Raises UsageError if
-    the source holds several subjects or the suffix is no image format, HeadError if the head cannot
-    be built, DatasetError if the picture cannot be written.
+    Raises UsageError if the source holds several subjects or the suffix is no image format, HeadError if
+    the head cannot be built, DatasetError if the picture cannot be written.
     """
     if picture.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise UsageError(f"{picture}: the picture's name must end in .png or .jpg")
@@ -69,8 +88,14 @@ def render_preview(
             mesh = lane.read(head)
             placement = lane.placer(config.landmarks).face(head, mesh)
             package = scratch / "preview.npz"
-            save_package(placement.normalise(head_alone(mesh, placement)), package)
             views = plan_views(config, head.name, placement.radius_mm, [pose])
+            placed = placement.normalise(head_alone(mesh, placement))
+            if shades(views):
+                placed = with_occlusion(placed)
+            if asks_labels(views):
+                points = lane.points(mesh, placement, config.landmarks)
+                placed = labelled_head(head, placed, points, None)
+            save_package(placed, package)
             outfits = lane.dressed(head, mesh, placement, views, config.landmarks)
             [image] = lane.shots.take(package, views, folders_of(config), outfits.worn)
             found = lane.detector(config.landmarks).detect(image)
@@ -84,12 +109,8 @@ def render_preview(
     except OSError as error:
         raise DatasetError(f"{picture}: cannot be written ({error.strerror})") from error
     left_out = (f"skipped {skip.subject}/{skip.expression}: {skip.reason}" for skip in source.skipped)
-    notes = "; ".join(
-        dict.fromkeys((*head.problems, *mesh.problems, *placement.notes, *outfits.left_out, *left_out))
-    )
-    return ("landmarks found" if found is not None else "no face was found at this pose") + (
-        f" ({notes})" if notes else ""
-    )
+    notes = (*head.problems, *mesh.problems, *placement.notes, *outfits.left_out, *left_out)
+    return Preview(found is not None, tuple(dict.fromkeys(notes)), drawn_values(config, head.name, pose))
 
 
 def draw_points(image: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -14,6 +14,10 @@ that fails is answered with ``{"error": "one line"}``. It ends when stdin closes
 "folder", "landmarks": bool, "sheet": columns}``
     renders poses as a build would: ``{"pictures": [path, ...], "landmarks": [[[x, y], ...] or null, ...]}``
     and, with columns, ``"sheet": path``, all of them in one picture with the landmarks drawn
+``{"op": "looks", "config", "package", "head", "radius_mm", "pose", "seeds": [...], "folder",
+"sheet": columns}``
+    the looks that builds with these seeds draw for one pose: ``{"pictures", "drawn": [{key: value}, ...]}``,
+    and ``"sheet"``, with each one's seed
 ``{"op": "thumbnail", "config", "subject", "expression", "pixels", "cache": FOLDER}``
     a small picture of a head at pose zero, made once for the same files: ``{"picture": path}``
 ``{"op": "plan", "config", "subject", "expression", "file": FILE.npy}``
@@ -29,6 +33,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,15 +50,17 @@ from generator.execution.lanes.renderer import check_blender
 from generator.execution.lanes.scratch import scratch_folder
 from generator.execution.preview.picture import draw_points
 from generator.heads.head import Head, HeadSource
+from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.surroundings import head_alone
+from generator.landmarks.occlusion import with_occlusion
 from generator.picture.scenery import folders_of
 from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.pose_plans import plan_poses
 from generator.plan.settings import Values
-from generator.plan.view_plan import plan_views
+from generator.plan.view_plan import drawn_values, plan_views
 from generator.plan.views import Pose, Views
 from generator.plan.wear import Worn
 
@@ -85,6 +92,7 @@ class PreviewServer:
             "list": self._list,
             "place": self._place,
             "pictures": self._pictures,
+            "looks": self._looks,
             "thumbnail": self._thumbnail,
             "plan": _draw_plan,
         }
@@ -110,7 +118,8 @@ class PreviewServer:
     def _place(self, config: BuildConfig, subject: str, expression: str, package: str) -> dict[str, Any]:
         head = self._head(subject, expression)
         placement = self._placement(config, subject)
-        mesh_problems, vertices = self._package(head, placement, Path(package))
+        # Looks of all kinds are tried out on a head that is placed.
+        mesh_problems, vertices = self._package(head, placement, Path(package), with_occlusion)
         return {
             "radius_mm": placement.radius_mm,
             "vertices": vertices,
@@ -130,24 +139,34 @@ class PreviewServer:
     ) -> dict[str, Any]:
         config = settled(config)
         views = plan_views(config, head, radius_mm, [(y, p, r) for y, p, r in poses])
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        paths, found, tiles = [], [], []
-        worn = self._worn(config, head, views)
-        for index, image in enumerate(self._render(Path(package), views, config, worn)):
+        found, tiles = [], []
+        images = [*self._render(Path(package), views, config, self._worn(config, head, views))]
+        for image in images:
             detector = self._open_lane().detector(config.landmarks) if landmarks else None
             points = detector.detect(image) if detector else None
             found.append(None if points is None else np.round(points[:, :2], 2).tolist())
-            path = target / f"{index:03d}.png"
-            _write(image, path)
-            paths.append(str(path))
             tiles.append(image if points is None else draw_points(image, points))
-        answer: dict[str, Any] = {"pictures": paths, "landmarks": found}
-        if sheet:
-            rows = [np.hstack(tiles[k : k + sheet]) for k in range(0, len(tiles), sheet)]
-            _write(np.vstack(rows), target / "sheet.png")
-            answer["sheet"] = str(target / "sheet.png")
-        return answer
+        return {**_written(images, Path(folder), tiles, sheet), "landmarks": found}
+
+    def _looks(
+        self,
+        config: BuildConfig,
+        package: str,
+        head: str,
+        radius_mm: float,
+        pose: Pose,
+        seeds: list[int],
+        folder: str,
+        sheet: int = 0,
+    ) -> dict[str, Any]:
+        config, (yaw, pitch, roll) = settled(config), pose
+        seeded = [replace(config, poses=replace(config.poses, seed=seed)) for seed in seeds]
+        planned = [plan_views(one, head, radius_mm, [(yaw, pitch, roll)])[0] for one in seeded]
+        views = Views.of(planned)
+        images = [*self._render(Path(package), views, config, self._worn(config, head, views))]
+        tiles = [_named(image, str(seed)) for image, seed in zip(images, seeds, strict=True)]
+        drawn = [drawn_values(one, head, (yaw, pitch, roll)) for one in seeded]
+        return {**_written(images, Path(folder), tiles, sheet), "drawn": drawn}
 
     def _thumbnail(
         self, config: BuildConfig, subject: str, expression: str, pixels: int, cache: str
@@ -191,13 +210,19 @@ class PreviewServer:
             self._placed[key] = placer.stand(in_placing_order(heads), config.poses.frame)
         return self._placed[key]
 
-    def _package(self, head: Head, placement: Placement, target: Path) -> tuple[tuple[str, ...], int]:
+    def _package(
+        self,
+        head: Head,
+        placement: Placement,
+        target: Path,
+        finish: Callable[[HeadMesh], HeadMesh] = lambda mesh: mesh,
+    ) -> tuple[tuple[str, ...], int]:
         """Write the placed head, with textures that are made for it beside it: (problems, vertices)."""
         textures = target.with_suffix("")
         shutil.rmtree(textures, ignore_errors=True)
         textures.mkdir(parents=True)
         mesh = self._open_lane().read(head, textures)
-        save_package(placement.normalise(head_alone(mesh, placement)), target)
+        save_package(finish(placement.normalise(head_alone(mesh, placement))), target)
         return mesh.problems, len(mesh.vertices)
 
     def _worn(self, config: BuildConfig, name: str, views: Views) -> tuple[tuple[Worn, ...], ...]:
@@ -225,6 +250,31 @@ def _draw_plan(config: BuildConfig, subject: str, expression: str, file: str) ->
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     np.save(file, plan.angles_deg)
     return {"count": len(plan)}
+
+
+def _written(images: list[np.ndarray], folder: Path, tiles: list[np.ndarray], columns: int) -> dict[str, Any]:
+    """Images as files, and with columns the tiles in one picture: what an answer says of them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{index:03d}.png" for index in range(len(images))]
+    for image, path in zip(images, paths, strict=True):
+        _write(image, path)
+    answer: dict[str, Any] = {"pictures": [str(path) for path in paths]}
+    if columns:
+        tiles = [*tiles, *[np.zeros_like(tiles[0])] * (-len(tiles) % columns)]
+        rows = [np.hstack(tiles[k : k + columns]) for k in range(0, len(tiles), columns)]
+        _write(np.vstack(rows), folder / "sheet.png")
+        answer["sheet"] = str(folder / "sheet.png")
+    return answer
+
+
+def _named(image: np.ndarray, name: str) -> np.ndarray:
+    """A copy of an image with a name in its lower left corner."""
+    marked, size = image.copy(), len(image) / 400
+    place = (round(8 * size), len(image) - round(10 * size))
+    for colour, width in (((0, 0, 0), 4), ((255, 255, 255), 1.5)):
+        thick = max(1, round(width * size * 1.5))
+        cv2.putText(marked, name, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, thick, cv2.LINE_AA)
+    return marked
 
 
 def _write(image: np.ndarray, path: Path) -> None:

@@ -11,11 +11,11 @@ from generator.heads.ict.atlas import Surface
 from generator.heads.ict.mesh import eye_frame
 from generator.heads.ict.source import EXPRESSIONS, IDENTITIES, MODES, FaceKit
 from generator.heads.parametric.appearance import Appearance
-from generator.heads.parametric.atlas import vertex_normals
 from generator.heads.parametric.curtain import curtain_vertices
 from generator.heads.parametric.expression import NEUTRAL_EXPRESSION, Expression
 from generator.heads.parametric.hair import hair_lift
 from generator.heads.parametric.noise import smoothstep
+from generator.heads.triangles import vertex_normals
 
 WEIGHT_LIMIT = 2.5
 """Identity weights come from the standard normal distribution and stay within this."""

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from generator.heads.parametric.source import data_folder
 from generator.heads.parametric.template import PARTS, HeadTemplate, head_template
+from generator.heads.triangles import vertex_normals
 
 ATLAS_SIZE = 1024
 """Texels along each side of skin.png."""
@@ -199,19 +200,6 @@ def _occlusion(template: HeadTemplate) -> np.ndarray:
     area = areas[emitter]
     share = area * np.maximum(received, 0) * np.maximum(emitted, 0) / (np.pi * squared + area)
     return np.clip(np.bincount(receiver, share, minlength=len(normals)), 0, 1)
-
-
-def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Area-weighted unit normals [V, 3] and a third of the surrounding area [V]; zero where unused."""
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    cross = np.cross(b - a, c - a) / 2
-    corner = triangles.ravel()
-    per_corner = np.repeat(cross, 3, axis=0)
-    count = len(vertices)
-    sums = np.stack([np.bincount(corner, per_corner[:, k], minlength=count) for k in range(3)], axis=1)
-    areas = np.bincount(corner, np.linalg.norm(per_corner, axis=1), minlength=count) / 3
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
-    return np.divide(sums, length, out=np.zeros_like(sums), where=length > 0), areas
 
 
 def _mask(name: str, source_uv: np.ndarray) -> np.ndarray:

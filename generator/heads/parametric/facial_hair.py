@@ -13,6 +13,9 @@ from generator.heads.parametric.atlas import ATLASES, Atlas
 from generator.heads.parametric.layers import lay
 from generator.heads.parametric.noise import NoiseField, grain, smoothstep
 
+HALF = 0.5
+"""From so much cover on, a texel is hair and not skin."""
+
 _BROW_T = np.array([0.0, 0.12, 0.35, 0.62, 0.82, 1.0])
 _BROW_Y = np.array([7.452, 7.462, 7.480, 7.494, 7.484, 7.448])
 _BROW_HALF = np.array([0.020, 0.038, 0.038, 0.030, 0.019, 0.006])
@@ -58,6 +61,21 @@ def _beard(atlas: Atlas, beard: str) -> _Beard:
     near, cover = near[cover > 0], cover[cover > 0].astype(np.float32)
     x, y, z = atlas.texels(near).T
     return _Beard(near, cover, NoiseField(np.arctan2(x, z - 0.35) * 70, y * 24))
+
+
+def beard_texels(atlas: Atlas, look: Appearance) -> np.ndarray:
+    """Texels where :func:`paint_beard` covers the skin, int [K]; none of stubble."""
+    if look.beard in ("none", "stubble"):
+        return np.empty(0, dtype=np.int64)
+    place = _beard(atlas, look.beard if look.beard in ("moustache", "goatee") else "full")
+    return place.where[place.cover > HALF]
+
+
+def brow_texels(atlas: Atlas, look: Appearance) -> np.ndarray:
+    """Texels where :func:`paint_brows` covers the skin, int [K]."""
+    place = _brows(atlas)
+    across = (place.height - np.float32(look.brow_height)) / (place.half * np.float32(look.brow_width))
+    return place.where[smoothstep(1.25, 0.45, np.abs(across)) * place.ends > HALF]
 
 
 def paint_beard(color: np.ndarray, atlas: Atlas, look: Appearance, rng: np.random.Generator) -> None:

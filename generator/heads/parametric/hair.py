@@ -10,10 +10,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from generator.heads.parametric.appearance import Appearance, hair_tone
-from generator.heads.parametric.atlas import ATLASES, Atlas, head_atlas, vertex_normals
+from generator.heads.parametric.atlas import ATLASES, Atlas, head_atlas
 from generator.heads.parametric.layers import lay
 from generator.heads.parametric.noise import NoiseField, grain, smooth_noise, smoothstep
 from generator.heads.parametric.template import PARTS, head_template
+from generator.heads.triangles import vertex_normals
 
 # The usual hairline on the base mesh: height (dm) against the angle from the face, degrees.
 _ANGLES = np.array([0, 14, 28, 42, 54, 62, 67, 72, 78, 95, 104, 120, 180.0])
@@ -109,6 +110,15 @@ def _scalp(atlas: Atlas) -> _Scalp:
         fine=NoiseField(around * 38, along * 2.5),
         coarse=NoiseField(around * 12, along * 1.5),
     )
+
+
+def hair_texels(atlas: Atlas, look: Appearance) -> np.ndarray:
+    """Texels where :func:`paint_hair` covers the skin, int [K]; none of a bald head's wreath."""
+    scalp = _scalp(atlas)
+    if look.hair_style == "bald":
+        return np.empty(0, dtype=np.int64)
+    line = np.interp(_STEPS, _ANGLES, _hairline(look)).astype(np.float32)
+    return scalp.where[(scalp.y > line[scalp.angle]) & (scalp.keep > 0.5)]
 
 
 def paint_hair(color: np.ndarray, atlas: Atlas, look: Appearance, rng: np.random.Generator) -> None:

@@ -300,6 +300,56 @@
     }
   }
 
+  // ---- variety ---------------------------------------------------------
+  function setUpVariety() {
+    const variety = data.variety;
+    if (!variety) {
+      $("variety").remove();
+      document.querySelector('nav a[href="#variety"]').remove();
+      return;
+    }
+    $("variety-note").textContent = `${variety.factors.length} settings are drawn, image by image or head by head. ` +
+      "Bars: how often each value was drawn; blue: with the face found, grey: missed. Below them the quarters of the " +
+      "distribution, or the choices: an image near the front, one in which the face was missed if there is one, and " +
+      "the share of faces found. Everything else is drawn as well, so differences in a small dataset may be chance.";
+    $("factors").append(...variety.factors.map(drawFactor));
+  }
+  function drawFactor(factor) {
+    const unit = factor.unit ? ` ${factor.unit}` : "";
+    const card = make("article", { class: "card factor", "data-factor": factor.name },
+      make("h3", { text: factor.name, title: factor.help }),
+      make("p", { class: "note" }, make("code", { text: factor.drawn }), `${unit}, for every ${factor.whose}`));
+    card.append(histogram(factor.histogram, unit));
+    const parts = make("div", { class: "parts" });
+    factor.parts.names.forEach((name, k) => {
+      const n = factor.parts.rows[k], share = n ? factor.parts.found[k] / n : null;
+      const tiles = make("div", { class: "tiles" });
+      for (const sample of factor.examples[k]) {
+        const tile = data.variety.tiles[sample];
+        if (!tile) continue;
+        const box = make("figure", { class: "tile", title: sample }, make("img", { src: tile.src, alt: sample }));
+        if (!tile.detected) box.append(make("figcaption", { class: "missed", text: "missed" }));
+        tiles.append(box);
+      }
+      const rate = make("div", { class: "rate", "data-part": name, "data-rows": n, "data-value": share ?? "",
+        text: share === null ? "–" : percent(share, 0) });
+      rate.append(make("small", { text: ` of ${whole(n)}` }));
+      if (share !== null) paint(rate, FOUND, share);
+      parts.append(make("div", {}, tiles, rate, make("div", { class: "under", text: name })));
+    });
+    card.append(parts);
+    return card;
+  }
+  function histogram(bins, unit) {
+    const most = Math.max(...bins.rows, 1), bars = make("div", { class: "bars" });
+    bins.names.forEach((name, k) => {
+      const say = `${name}${unit}: ${images(bins.rows[k])}, ${whole(bins.found[k])} with the face found`;
+      bars.append(make("i", { title: say, "data-rows": bins.rows[k], style: `height:${(100 * bins.rows[k]) / most}%` },
+        make("b", { style: `height:${bins.rows[k] ? (100 * bins.found[k]) / bins.rows[k] : 0}%` })));
+    });
+    return bars;
+  }
+
   // ---- the rest --------------------------------------------------------
   function setUpHeads() {
     const hidden = data.heads_count - data.publishable;
@@ -358,6 +408,7 @@
   setUpSheet();
   setUpMaps();
   if (!data.why_no_atlas) setUpFace();
+  setUpVariety();
   setUpHeads();
   setUpBuild();
   document.documentElement.dataset.ready = "yes";

@@ -71,7 +71,7 @@ def thumbnails(
         return [None] * len(heads)
     names = [_name(head, _most_frontal(poses.plan(k))) for k, head in enumerate(heads[:THUMBNAILS])]
     rows = read_samples(root, manifest, names)
-    shown = [_picture(root, rows[name], THUMBNAIL_PX) if name in rows else None for name in names]
+    shown = [picture_uri(root, rows[name], THUMBNAIL_PX) if name in rows else None for name in names]
     return [*shown, *[None] * (len(heads) - len(shown))]
 
 
@@ -96,7 +96,7 @@ def _tile(root: Path, row: Mapping[str, Any] | None, drawn: np.ndarray) -> dict[
     exact = RowCameras.of_row(row).pixels(exact_mm)[0]
     found = np.array(row["landmarks"]).reshape(-1, 3)
     return {
-        "src": _picture(root, row, SHEET_PX),
+        "src": picture_uri(root, row, SHEET_PX),
         "pose": [row[f"{angle}_deg"] for angle in ANGLES],
         "detected": row["detected"],
         "found": _points(found[drawn], row),
@@ -109,7 +109,11 @@ def _points(points: np.ndarray, row: Mapping[str, Any]) -> list[int]:
     return placed[np.isfinite(placed).all(axis=1)].round().astype(int).ravel().tolist()
 
 
-def _picture(root: Path, row: Mapping[str, Any], size: int) -> str:
+def picture_uri(root: Path, row: Mapping[str, Any], size: int) -> str:
+    """The image of a row as a data URI: a JPEG with sides of size pixels.
+
+    Raises DatasetError: it is missing or damaged.
+    """
     picture = decode_image(image_bytes(root, row), f"{root}: the image of {row['sample_id']}")
     file = io.BytesIO()
     tile = Fitted.of(row["width"], row["height"], size).paste(picture, PAPER)

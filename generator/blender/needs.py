@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the materials of a stage have nodes for."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+from generator.plan.settings import Look
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a look needs of materials and world besides a key light and ambient light; no other node is made.
+
+    environment: a panorama may light it. occlusion: light is kept out of what is closed in. lamps: how many
+    are lit. gloss: the skin has some.
+    """
+
+    environment: bool = False
+    occlusion: bool = False
+    lamps: int = 0
+    gloss: bool = False
+
+    @classmethod
+    def of(cls, look: Look, environment: bool = False) -> Needs:
+        """Those of a look, which a panorama lights or not."""
+        occlusion = look.preset == "fast" and look.occlusion > 0
+        return cls(environment, occlusion, len(look.lamps), look.gloss > 0)
+
+    def cover(self, others: Needs) -> bool:
+        """Is there a node for all that others need?"""
+        return all(mine >= other for mine, other in zip(astuple(self), astuple(others), strict=True))
+
+    def __or__(self, others: Needs) -> Needs:
+        """What one or the other needs."""
+        return Needs(*map(max, astuple(self), astuple(others)))
