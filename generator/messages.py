@@ -130,7 +130,7 @@ class BuildOrder:
     root: the dataset. indices: place of each view's pose in the grid.
     anchors: float64 [P, 3], frame C at the pose zero of the dataset, mm; NaN where there is none.
     configuration_digest: of what all parts of the dataset share.
-    environments, pictures: folders as in :class:`generator.picture.scenery.Folders`.
+    environments, pictures, things: folders as in :class:`generator.picture.scenery.Folders`.
     """
 
     unit: str
@@ -149,6 +149,7 @@ class BuildOrder:
     earlier_units: tuple[str, ...] = ()
     environments: str = ""
     pictures: str = ""
+    things: str = ""
 
     @property
     def part_path(self) -> str:

@@ -84,6 +84,7 @@ WORN: Registry[Any] = Registry(
         "mask": "generator.worn.mask:KIND",
         "clothes": "generator.worn.clothes:KIND",
         "occluder": "generator.worn.occluder:KIND",
+        "thing": "generator.worn.things:KIND",
     },
 )
 """What a head may wear: a :class:`generator.worn.fit.Kind` by the setting that says its style, see

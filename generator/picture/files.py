@@ -54,7 +54,7 @@ def packaged_panoramas() -> Path:
 
 
 def named_files(folder: Path, suffixes: tuple[str, ...], what: str) -> dict[str, Path]:
-    """The files of a folder by their names, sorted. Panoramas are named without their suffix.
+    """The files of a folder by their names, sorted. Panoramas and things are named without their suffix.
 
     what: the setting, for messages. Raises UsageError: no folder, none in it, too many, or a name that cannot
     stand in a choice.
@@ -69,7 +69,7 @@ def named_files(folder: Path, suffixes: tuple[str, ...], what: str) -> dict[str,
         raise UsageError(f"{what}: {folder}: has {len(every)} files, more than {MAX_FILES}; give fewer")
     files: dict[str, Path] = {}
     for path in every:
-        name = path.stem if suffixes == PANORAMAS else path.name
+        name = path.name if suffixes == PICTURES else path.stem
         if not name.isprintable() or set(name) & set(",:;"):
             raise UsageError(f"{what}: {shortened(repr(str(path)))}: rename it without commas and colons")
         if name in files:

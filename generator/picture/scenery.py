@@ -37,15 +37,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Folders:
-    """Where they are, as absolute paths. "": the panoramas of Blender, and no pictures."""
+    """Where they are, as absolute paths. "": the panoramas of Blender, no pictures and no things."""
 
     environments: str = ""
     pictures: str = ""
+    things: str = ""
 
 
 def folders_of(config: BuildConfig) -> Folders:
     """Those of a configuration."""
-    given = config.render.environments, config.render.pictures
+    given = config.render.environments, config.render.pictures, config.render.things
     return Folders(*(str(config.located(path)) if path else "" for path in given))
 
 

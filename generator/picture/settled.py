@@ -7,7 +7,7 @@ So draws depend on no folder, verify needs none, and units have another name whe
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -19,6 +19,7 @@ from generator.picture.files import PANORAMAS, PICTURES, named_files, packaged_p
 from generator.plan.config import BuildConfig
 from generator.plan.distribution import Distribution
 from generator.plan.render_settings import BACKDROPS, ENVIRONMENT, NOTHING, PICTURE
+from generator.plan.thing import SUFFIXES, content
 from generator.plan.wear import LENSES, STYLES
 
 ALL = "all"
@@ -46,6 +47,11 @@ def settled(config: BuildConfig) -> BuildConfig:
             raise UsageError("render.backdrop: no folder of pictures is given; name one in --pictures")
         found = named_files(picture_folder(config), PICTURES, "render.pictures")
         config = _named(config, "backdrop_picture", found, digest, ())
+    if any(name != NOTHING for name in _texts(config, "thing")):
+        if config.render.things is None:
+            raise UsageError("render.thing: no folder of things is given; name one in --things")
+        found = named_files(config.located(config.render.things), SUFFIXES, "render.things")
+        config = _named(config, "thing", found, digest, (NOTHING,), content)
     used = digest.hexdigest() if digest.digest() != hashlib.sha256().digest() else ""
     return replace(config, render=replace(config.render, files_sha256=used))
 
@@ -64,8 +70,10 @@ def picture_folder(config: BuildConfig) -> Path:
 def check_files(config: BuildConfig) -> None:
     """Are the files that a settled configuration names still the same? Raises UsageError if not."""
     if settled(config).render.files_sha256 != config.render.files_sha256:
-        where = [*filter(None, (config.render.environments, config.render.pictures))]
-        raise UsageError(f"{', '.join(where) or 'Blender'}: its panoramas or pictures are others than then")
+        given = config.render
+        where = [*filter(None, (given.environments, given.pictures, given.things))]
+        what = "panoramas, pictures or things" if given.things else "panoramas or pictures"
+        raise UsageError(f"{', '.join(where) or 'Blender'}: its {what} are others than then")
 
 
 def _texts(config: BuildConfig, key: str) -> tuple[str, ...]:
@@ -75,9 +83,17 @@ def _texts(config: BuildConfig, key: str) -> tuple[str, ...]:
 
 
 def _named(
-    config: BuildConfig, key: str, files: dict[str, Path], digest: hashlib._Hash, others: Sequence[str]
+    config: BuildConfig,
+    key: str,
+    files: dict[str, Path],
+    digest: hashlib._Hash,
+    others: Sequence[str],
+    read: Callable[[Path], bytes] | None = None,
 ) -> BuildConfig:
-    """The configuration with the names of files for "all", or for nothing; the digest learns of each."""
+    """The configuration with the names of files for "all", or for nothing; the digest learns of each.
+
+    read: what decides a file's look, if not its bytes.
+    """
     texts = _texts(config, key)
     for name in dict.fromkeys(name for text in texts for name in (files if text in (ALL, "") else (text,))):
         if name in others:
@@ -85,8 +101,9 @@ def _named(
         if name not in files:
             near = get_close_matches(name, files, 3) or [*files][:10]
             raise UsageError(f"render.{key}: no {quoted(name)}; {_there_are(near)}")
-        content = hashlib.sha256(read_file(files[name], f"render.{key}")).hexdigest()
-        digest.update(f"{key} {name}\0{content}\n".encode())
+        path = files[name]
+        found = hashlib.sha256(read(path) if read else read_file(path, f"render.{key}")).hexdigest()
+        digest.update(f"{key} {name}\0{found}\n".encode())
     return _chosen(config, key, texts, tuple(files))
 
 

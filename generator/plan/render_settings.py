@@ -200,6 +200,10 @@ class Files:
     pictures: str | None = setting(
         None, "Folder of pictures, .png or .jpg, for backdrops", content=False, path=True
     )
+    things: str | None = setting(
+        None, "Folder of things of your own that heads may wear: .obj, .ply or .glb, a .json beside each",
+        content=False, path=True,
+    )  # fmt: skip
     files_sha256: str = setting(
         "", "SHA-256 of the names and bytes of those that are used; a build finds it", flag=""
     )

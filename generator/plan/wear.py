@@ -61,6 +61,10 @@ class Wear:
     mask: str = _kind("mask", "A mask over mouth and nose", "Mask")
     clothes: str = _kind("clothes", "Shoulders, and what they wear", "Clothes")
     occluder: str = _kind("occluder", "What is before the face", "Occluder")
+    thing: str = setting(
+        NOTHING, "One of your own things, by its name in --things; all draws from every one", label="Thing",
+        varies=True, since="1.3.0",
+    )  # fmt: skip
     occluder_x: float = setting(
         0.0, "How far right of the nose it is, in widths of the face", low=-2, high=2, label="Occluder right",
         varies=True, since="1.3.0",
@@ -77,9 +81,10 @@ class Wear:
     @property
     def wears(self) -> dict[str, str]:
         """Kind -> style of what is not as the head has it."""
-        return {
+        worn = {
             kind: getattr(self, kind) for kind, styles in STYLES.items() if getattr(self, kind) != styles[0]
         }
+        return worn if self.thing == NOTHING else {**worn, "thing": self.thing}
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,15 @@ class Fit:
     """A head in frame U, mm, pivot at the origin: x image right, y up, z towards the viewer.
 
     mesh: the head. points: float64 [P, 3], its landmarks (Face Mesh) on the mesh; NaN where there is none.
-    others: what else it wears of the kinds that the maker minds, kind -> style.
+    others: what else it wears of the kinds that the maker minds, kind -> style. things: folder of a user's
+    own things; scratch: an existing folder for textures that are made, which stays as long as what is worn.
     """
 
     mesh: HeadMesh
     points: np.ndarray
     others: Mapping[str, str] = field(default_factory=dict)
+    things: str = ""
+    scratch: str = ""
 
     def at(self, *places: int) -> np.ndarray:
         """Landmarks by their number, float64 [len(places), 3]. Raises CannotWear if one has no place."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -104,18 +105,22 @@ class Wardrobe:
         self._made: dict[tuple[str, ...], Thing | str] = {}
         self._count = 0
 
-    def dress(self, name: str, mesh: HeadMesh, points: np.ndarray, views: Views) -> Outfits:
+    def dress(self, name: str, mesh: HeadMesh, points: np.ndarray, views: Views, things: str = "") -> Outfits:
         """What a head wears in some views.
 
         name: subject/expression, on which colours and sizes depend. mesh: frame U, mm, pivot at the origin;
         the very one, as long as it is the same. points: float [P, 3], landmarks on it, frame C, mm.
+        things: folder of a user's own.
         """
         if not any(look.wears for look in views.looks):
             return Outfits()
-        if self._fit is None or self._name != name or self._fit.mesh is not mesh:
-            for old in self._folder.iterdir():
-                old.unlink()
-            self._name, self._fit, self._made = name, Fit(mesh, points @ CAMERA_FROM_GRAPHICS), {}
+        known = self._fit
+        if known is None or self._name != name or known.mesh is not mesh or known.things != things:
+            shutil.rmtree(self._folder)
+            self._folder.mkdir()
+            on_mesh = points @ CAMERA_FROM_GRAPHICS
+            self._name, self._made = name, {}
+            self._fit = Fit(mesh, on_mesh, things=things, scratch=str(self._folder))
         dressed = [self._outfit(view) for view in views]
         return Outfits([things for things, _ in dressed], [reason for _, reason in dressed])
 
@@ -139,7 +144,7 @@ class Wardrobe:
         if key not in self._made:
             rng = np.random.default_rng(draw_seed(0, "worn", self._name, kind, style, variant))
             try:
-                if style not in STYLES[kind]:
+                if style not in STYLES.get(kind, (style,)):
                     raise CannotWear(f"there is no {style!r}")
                 mesh = maker.make(replace(self._fit, others=others), style, rng)
             except CannotWear as error:

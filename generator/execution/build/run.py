@@ -61,6 +61,7 @@ from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, differences, recorded_config
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE, plan_poses, read_pose_plans, shared_plan
+from generator.worn.things import check_things
 
 
 @dataclass
@@ -109,6 +110,7 @@ def build(
     root = root.absolute()
     shared_plan(config)  # what makes no sense is said before a folder is made
     config = settled(config)
+    check_things(config)
     claim(root)
     with locked(root) as lock:
         if fresh:

@@ -146,6 +146,7 @@ def build_order(
         landmarks=config.landmarks,
         environments=folders.environments,
         pictures=folders.pictures,
+        things=folders.things,
     )
 
 

@@ -144,13 +144,21 @@ class Lane:
         return read_mesh(head, folder, import_with_blender=self.renderer.import_mesh)
 
     def dressed(
-        self, head: Head, mesh: HeadMesh, placement: Placement, views: Views, landmarks: Landmarks
+        self,
+        head: Head,
+        mesh: HeadMesh,
+        placement: Placement,
+        views: Views,
+        landmarks: Landmarks,
+        things: str = "",
     ) -> Outfits:
-        """What a head that stands wears in some views, for a preview. mesh: as read."""
+        """What a head that stands wears in some views, for a preview. mesh: as read. things: folder of a
+        user's own."""
         if not any(look.wears for look in views.looks):
             return Outfits()
         placed = placement.normalise(head_alone(mesh, placement))
-        return self._wardrobe.dress(head.name, placed, self.points(mesh, placement, landmarks), views)
+        points = self.points(mesh, placement, landmarks)
+        return self._wardrobe.dress(head.name, placed, points, views, things)
 
     def points(self, mesh: HeadMesh, placement: Placement, landmarks: Landmarks) -> np.ndarray:
         """The anchors of a head that stands, for a preview: float64 [P, 3], frame C, mm. mesh: as read."""
@@ -196,7 +204,7 @@ class Lane:
                     f"{order.head.mesh_path}: {off} of its anchors are not on its surface: what an earlier "
                     f"run noted about it was changed; delete {PLACED_FILE} and run the build again"
                 )
-            outfits = self._wardrobe.dress(order.head.name, self._mesh, order.anchors, views)
+            outfits = self._wardrobe.dress(order.head.name, self._mesh, order.anchors, views, order.things)
             visible = self._surface.visible(order.anchors, views) & ~outfits.hidden(order.anchors, views)
         topology = detector.topology
         landmarks = np.full((len(views), topology.count, 3), np.nan, dtype=np.float32)

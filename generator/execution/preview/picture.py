@@ -96,8 +96,9 @@ def render_preview(
                 points = lane.points(mesh, placement, config.landmarks)
                 placed = labelled_head(head, placed, points, None)
             save_package(placed, package)
-            outfits = lane.dressed(head, mesh, placement, views, config.landmarks)
-            [image] = lane.shots.take(package, views, folders_of(config), outfits.worn)
+            folders = folders_of(config)
+            outfits = lane.dressed(head, mesh, placement, views, config.landmarks, folders.things)
+            [image] = lane.shots.take(package, views, folders, outfits.worn)
             found = lane.detector(config.landmarks).detect(image)
         finally:
             lane.close()

@@ -231,7 +231,8 @@ class PreviewServer:
             return ()
         head = self._head(*name.split("/"))
         placement, lane = self._placement(config, head.subject), self._open_lane()
-        return lane.dressed(head, lane.read(head), placement, views, config.landmarks).worn
+        things = folders_of(config).things
+        return lane.dressed(head, lane.read(head), placement, views, config.landmarks, things).worn
 
     def _render(
         self, package: Path, views: Views, config: BuildConfig, worn: tuple[tuple[Worn, ...], ...] = ()
