@@ -3,57 +3,69 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
-from . import pictures, windows
+from . import pictures, session, windows
 from .core.looks import SHEET
-from .operators import SHEET_COLUMNS, nothing_is_due, there_is_a_head
+from .operators import SHEET_COLUMNS, there_is_a_head
 
 
-class _OfHead:
+class _Dice:
+    """Blender keeps a button grey for as long as the mouse rests on it, so a throw that comes too early is
+    refused when it is made, and the next one needs no other movement of the hand."""
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return nothing_is_due(cls) and there_is_a_head(cls, context)
+        return there_is_a_head(cls, context)
+
+    def execute(self: Any, context: bpy.types.Context) -> set[str]:
+        if session.conversation.is_busy:
+            self.report({"INFO"}, "Wait for what is going on")
+            return {"CANCELLED"}
+        self.act(context.scene.headturn)
+        return {"FINISHED"}
+
+    def act(self, shown: session.Shown) -> None:
+        """What the button does."""
+        raise NotImplementedError
 
 
-class RollTheDice(_OfHead, bpy.types.Operator):
+class RollTheDice(_Dice, bpy.types.Operator):
     """Show a look at the pose in view: lens, light, backdrop and all else that is drawn. What no setting draws is drawn as photographs are"""  # noqa: E501  one tooltip
 
     bl_idname = "headturn.roll_dice"
     bl_label = "Roll the Dice"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, shown: session.Shown) -> None:
         from . import looks
 
-        looks.roll(context.scene.headturn)
-        return {"FINISHED"}
+        looks.roll(shown)
 
 
-class ShowLook(_OfHead, bpy.types.Operator):
+class ShowLook(_Dice, bpy.types.Operator):
     """Show the look of this seed at the pose in view"""
 
     bl_idname = "headturn.show_look"
     bl_label = "Show Look"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, shown: session.Shown) -> None:
         from . import looks
 
-        looks.show(context.scene.headturn)
-        return {"FINISHED"}
+        looks.show(shown)
 
 
-class LookSheet(_OfHead, bpy.types.Operator):
+class LookSheet(_Dice, bpy.types.Operator):
     """Show nine looks at the pose in view: of this seed and those after it"""
 
     bl_idname = "headturn.look_sheet"
     bl_label = "Sheet of Looks"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, shown: session.Shown) -> None:
         from . import looks
 
-        shown = context.scene.headturn
         looks.sheet(shown, range(shown.look_seed, shown.look_seed + SHEET), SHEET_COLUMNS)
-        return {"FINISHED"}
 
 
 class OpenLooks(bpy.types.Operator):

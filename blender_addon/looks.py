@@ -29,7 +29,7 @@ def show(shown: Shown) -> None:
 
     def take(answer: dict[str, Any]) -> None:
         pictures.keep(pictures.LOOK, Path(answer["pictures"][0]))
-        session.state.look = Look(head, angles, seed, answer["drawn"][0])
+        session.state.look = Look(head, angles, seed, answer["drawn"][0], answer["left_out"][0])
 
     _request(shown, [seed], "rolling the dice...", take)
 

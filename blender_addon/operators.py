@@ -30,8 +30,7 @@ def source_is_named(cls: Any, context: bpy.types.Context) -> bool:
     return True
 
 
-def nothing_is_due(cls: Any) -> bool:
-    """For a poll: has the host answered everything?"""
+def _nothing_is_due(cls: Any) -> bool:
     if session.conversation.is_busy:
         cls.poll_message_set("Wait for what is going on")
         return False
@@ -66,7 +65,7 @@ class LoadHeads(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return source_is_named(cls, context) and nothing_is_due(cls)
+        return source_is_named(cls, context) and _nothing_is_due(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import heads
@@ -142,7 +141,7 @@ class PreviewExtremes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return nothing_is_due(cls) and there_is_a_head(cls, context)
+        return _nothing_is_due(cls) and there_is_a_head(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import landmarks

@@ -154,6 +154,8 @@ class LooksPanel(_Tab, bpy.types.Panel):
             if icon:
                 layout.template_icon(icon_value=icon, scale=9)
             message(layout, context, line)
+            if state.look.left_out:
+                message(layout, context, panel.Line(f"left out: {state.look.left_out}", "INFO"))
             self._draw_values(layout.column(align=True), state.look)
         layout.operator("headturn.look_sheet", icon="IMAGE_DATA")
         icon = pictures.icon(pictures.LOOKS)
@@ -165,7 +167,7 @@ class LooksPanel(_Tab, bpy.types.Panel):
     def _draw_values(column: bpy.types.UILayout, look: Look) -> None:
         column.scale_y = 0.75
         for name, value in look.values():
-            split = column.split(factor=0.5)
+            split = column.split(factor=0.56)
             split.label(text=one_line(name))
             split.label(text=one_line(value))
 

@@ -82,8 +82,14 @@ def clear(scene: bpy.types.Scene) -> None:
     for thing in list(scene.objects):
         data = thing.data
         materials = list(data.materials) if isinstance(data, bpy.types.Mesh) else []
+        groups = {
+            node.node_tree
+            for material in materials
+            for node in (material.node_tree.nodes if material and material.node_tree else ())
+            if node.type == "GROUP"
+        }
         bpy.data.objects.remove(thing)
-        for left in (data, *materials):  # in this order: a mesh is a user of its materials
+        for left in (data, *materials, *groups):  # in this order: each is a user of those after it
             if left is not None and not left.users:
                 bpy.data.batch_remove([left])
     if scene.world is not None and scene.world.users == 1:

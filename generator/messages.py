@@ -19,6 +19,7 @@ from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors
 from generator.landmarks.shared import SharedAnchors
 from generator.plan.environment_light import EnvironmentLight
+from generator.plan.factors import part_folder
 from generator.plan.settings import Landmarks
 from generator.plan.views import Views
 from generator.plan.wear import Worn
@@ -131,6 +132,7 @@ class BuildOrder:
     anchors: float64 [P, 3], frame C at the pose zero of the dataset, mm; NaN where there is none.
     configuration_digest: of what all parts of the dataset share.
     environments, pictures, things: folders as in :class:`generator.picture.scenery.Folders`.
+    factor: the views are twins, with this one changed.
     """
 
     unit: str
@@ -150,21 +152,22 @@ class BuildOrder:
     environments: str = ""
     pictures: str = ""
     things: str = ""
+    factor: str = ""
 
     @property
     def part_path(self) -> str:
         """Where its part lies, relative to the dataset."""
-        return part_path(self.split, self.unit)
+        return part_path(self.split, self.unit, self.factor)
 
     @property
     def earlier_paths(self) -> tuple[str, ...]:
         """Where it may lie under an earlier name."""
-        return tuple(part_path(self.split, unit) for unit in self.earlier_units)
+        return tuple(part_path(self.split, unit, self.factor) for unit in self.earlier_units)
 
 
-def part_path(split: str, unit: str) -> str:
-    """Where the part of a unit lies, relative to the dataset."""
-    return f"data/{split}/part-{unit}.parquet"
+def part_path(split: str, unit: str, factor: str = "") -> str:
+    """Where the part of a unit lies, relative to the dataset. factor: of twins."""
+    return f"{part_folder(factor)}/{split}/part-{unit}.parquet"
 
 
 # From a lane.

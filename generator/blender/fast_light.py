@@ -53,14 +53,15 @@ class FastLight:
         self.needs = needs
         self._groups: dict[bool, _Group] = {}
 
-    def into(self, tree: bpy.types.NodeTree, glossy: bool) -> Lit:
-        """What a surface sends back, in the nodes of a material. glossy: it has a gloss, in some look."""
+    def into(self, tree: bpy.types.NodeTree, normal: bpy.types.NodeSocket | None, glossy: bool) -> Lit:
+        """What a surface sends back, in the nodes of a material. normal: that of the mesh, if there is no
+        other. glossy: it has a gloss, in some look."""
         if glossy not in self._groups:
             self._groups[glossy] = _Group(self.needs, glossy)
-        geometry = tree.nodes.new("ShaderNodeNewGeometry")
+        normal = normal or tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
         node = tree.nodes.new("ShaderNodeGroup")
         node.node_tree, node.name = self._groups[glossy].tree, LIGHT
-        tree.links.new(geometry.outputs["Normal"], node.inputs[NORMAL])
+        tree.links.new(normal, node.inputs[NORMAL])
         return Lit(node.outputs[LIGHT], node.outputs[SHINE] if glossy else None)
 
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:

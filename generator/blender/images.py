@@ -21,6 +21,7 @@ from generator.heads.package import load_package
 from generator.labels import LABELS
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.passes import PAINTED_SAMPLES
+from generator.plan.shading import unshaded
 from generator.plan.views import View
 from generator.plan.wear import Worn
 
@@ -105,7 +106,8 @@ class Images:
 
     def render_passes(self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
-        stage = self._show(view, None, worn)
+        # Geometry alone: what a path tracer calls the normal is that of its glossy part, too.
+        stage = self._show(replace(view, look=unshaded(view.look)), None, worn)
         if "uv" in passes and not self._knows_uv:
             # Persistent data keeps the mesh as pictures need it, which is without its UV map.
             for thing in stage.objects:

@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from generator.blender.fast_light import FastLight
 from generator.blender.lamps import key_direction, key_strengths, lamp_light
-from generator.blender.materials import set_gloss, srgb_to_linear
+from generator.blender.materials import set_look, srgb_to_linear
 from generator.blender.needs import Needs
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
@@ -32,8 +32,9 @@ class Light(Protocol):
         """No longer."""
         ...
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> None:
-        """Make it that of a look, and of an environment where there is one."""
+    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
+        """Make it that of a look, and of an environment where there is one. pixel_mm: what a pixel covers on
+        the head."""
         ...
 
 
@@ -52,7 +53,7 @@ def build_light(scene: bpy.types.Scene, needs: Needs, fast: FastLight | None) ->
 
 
 class _Materials:
-    """What is lit: its gloss is set with the light."""
+    """What is lit: gloss and relief are set with the light."""
 
     def __init__(self) -> None:
         self._materials: list[bpy.types.Material] = []
@@ -65,10 +66,10 @@ class _Materials:
         """See :class:`Light`."""
         self._materials = [material for material in self._materials if material not in materials]
 
-    def set_gloss(self, look: Look) -> None:
-        """Make it that of a look."""
+    def set_looks(self, look: Look, pixel_mm: float) -> None:
+        """Make them those of a look."""
         for material in self._materials:
-            set_gloss(material, look.gloss)
+            set_look(material, look, pixel_mm)
 
 
 class LightInMaterials(_Materials):
@@ -82,11 +83,11 @@ class LightInMaterials(_Materials):
         tree.links.new(self._background.outputs[0], output.inputs["Surface"])
         self._fast = fast
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> None:
+    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
         self._fast.set(look, environment)
-        self.set_gloss(look)
+        self.set_looks(look, pixel_mm)
 
 
 class LightInScene(_Materials):
@@ -114,7 +115,7 @@ class LightInScene(_Materials):
         self._key = _sun(scene, "key")
         self._lamps = [_sun(scene, "lamp") for _ in range(needs.lamps)]
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> None:
+    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
         key, ambient = key_strengths(look, environment)
@@ -124,7 +125,7 @@ class LightInScene(_Materials):
         _shine_from(self._key, key_direction(look), (key, key, key))
         for lamp, given in zip(self._lamps, look.lamps, strict=True):
             _shine_from(lamp, *lamp_light(given))
-        self.set_gloss(look)
+        self.set_looks(look, pixel_mm)
 
 
 def _sun(scene: bpy.types.Scene, name: str) -> bpy.types.Object:

@@ -9,11 +9,14 @@ import bpy
 
 from generator.blender.fast_light import GLOSS, LIGHT, FastLight
 from generator.blender.label_group import labels_group
+from generator.blender.needs import Needs
 from generator.blender.nodes import math_node, vector_node
+from generator.blender.skin import Skin, has_relief, relief, set_relief
 from generator.heads.mesh import Material
-from generator.heads.shine import gloss_of
+from generator.heads.shine import gloss_of, is_skin
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 from generator.labels import LABELS
+from generator.plan.settings import Look
 
 VERTEX_COLORS = "Color"
 UV_MAP = "UVMap"
@@ -30,15 +33,15 @@ GLOSSY, LEAST_ROUGHNESS = 0.35, 0.05
 CLEAREST = 0.02
 """Opacity of a material that is clearer than that."""
 
-_PRINCIPLED, _LABEL, _GLOSS = "principled", "headturn_label", "headturn_gloss"
+_LABEL, _GLOSS = "headturn_label", "headturn_gloss"
 
 
 LIT, ALBEDO, LABELLED = "lit", "albedo", "labelled"
-"""What a material may show: itself, its colour alone, or what it is. Under each it keeps a node's name."""
+"""Nodes of what a material may show: itself, its colour alone, or what it is."""
 
 
 def build_material(
-    material: Material, fast: FastLight | None, *, has_vertex_colors: bool
+    material: Material, fast: FastLight | None, needs: Needs, *, has_vertex_colors: bool
 ) -> bpy.types.Material:
     """A Blender material with the head's colour.
 
@@ -54,14 +57,15 @@ def build_material(
     color, alpha = _base_color(tree, material, has_vertex_colors)
     # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
     made.cycles.emission_sampling = "NONE"
-    surface = _principled(tree, color) if fast is None else _lit_by_normal(tree, color, fast, material)
+    skin = relief(tree, color) if needs.relief and is_skin(material) else Skin(color)
+    surface = _principled(tree, skin) if fast is None else _lit_by_normal(tree, skin, fast, material)
     label = _label_color(tree, material)
     for name, lit in ((LIT, surface), (ALBEDO, _emitted(tree, color)), (LABELLED, _emitted(tree, label))):
         if material.cutout and alpha is not None:
             lit = _cut_out(tree, lit, alpha)
         if material.opacity < 1:
             lit = _cut_out(tree, lit, _value(tree, material.opacity))
-        made[name] = lit.node.name
+        lit.node.name = name
     show(made, LIT)
     return made
 
@@ -70,7 +74,7 @@ def show(material: bpy.types.Material, name: str) -> None:
     """Have a material show one of LIT, ALBEDO and LABELLED: that is linked, the others cost nothing."""
     tree = material.node_tree
     [output] = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
-    tree.links.new(tree.nodes[material[name]].outputs[0], output.inputs["Surface"])
+    tree.links.new(tree.nodes[name].outputs[0], output.inputs["Surface"])
 
 
 def srgb_to_linear(color: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -133,6 +137,27 @@ def _load_image(path: Path) -> bpy.types.Image:
     return image
 
 
+def set_look(made: bpy.types.Material, look: Look, pixel_mm: float) -> None:
+    """Make a material's gloss and relief those of a look. pixel_mm: what a pixel covers on the head."""
+    _set_gloss(made, look.gloss)
+    if has_relief(made.node_tree):
+        set_relief(made.node_tree, look.skin_detail, pixel_mm)
+
+
+def _set_gloss(made: bpy.types.Material, skin: float) -> None:
+    """Give a material the gloss that it has where the skin has so much."""
+    gloss = gloss_of(Material(made.name, label=made[_LABEL], gloss=made[_GLOSS]), skin)
+    nodes = made.node_tree.nodes
+    if LIGHT in nodes:
+        if GLOSS in nodes[LIGHT].inputs:
+            nodes[LIGHT].inputs[GLOSS].default_value = gloss
+        return
+    level, roughness = (GLOSSY, max(LEAST_ROUGHNESS, 1 - gloss)) if gloss else MATT
+    [principled] = [node for node in nodes if node.type == "BSDF_PRINCIPLED"]
+    principled.inputs["Specular IOR Level"].default_value = level
+    principled.inputs["Roughness"].default_value = roughness
+
+
 def _emitted(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     emission = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(color, emission.inputs["Color"])
@@ -155,25 +180,13 @@ def _label_color(tree: bpy.types.NodeTree, material: Material) -> bpy.types.Node
     return group.outputs[0]
 
 
-def set_gloss(made: bpy.types.Material, skin: float) -> None:
-    """Give a material the gloss that it has where the skin has so much."""
-    gloss = gloss_of(Material(made.name, label=made[_LABEL], gloss=made[_GLOSS]), skin)
-    nodes = made.node_tree.nodes
-    if _PRINCIPLED in nodes:
-        level, roughness = (GLOSSY, max(LEAST_ROUGHNESS, 1 - gloss)) if gloss else MATT
-        nodes[_PRINCIPLED].inputs["Specular IOR Level"].default_value = level
-        nodes[_PRINCIPLED].inputs["Roughness"].default_value = roughness
-    elif GLOSS in nodes[LIGHT].inputs:
-        nodes[LIGHT].inputs[GLOSS].default_value = gloss
-
-
 def _lit_by_normal(
-    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, fast: FastLight, material: Material
+    tree: bpy.types.NodeTree, skin: Skin, fast: FastLight, material: Material
 ) -> bpy.types.NodeSocket:
     """Emission = colour x what a white surface of this normal sends back, and what it mirrors."""
     emission = tree.nodes.new("ShaderNodeEmission")
-    lit = fast.into(tree, gloss_of(material, 1.0 if fast.needs.gloss else 0.0) > 0)
-    sent = _times(tree, color, lit.light)
+    lit = fast.into(tree, skin.normal, gloss_of(material, 1.0 if fast.needs.gloss else 0.0) > 0)
+    sent = _times(tree, skin.color, lit.light)
     if lit.shine is not None:
         mirrored = lit.shine
         if material.opacity < 1:
@@ -184,10 +197,11 @@ def _lit_by_normal(
     return emission.outputs[0]
 
 
-def _principled(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _principled(tree: bpy.types.NodeTree, skin: Skin) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    node.name = _PRINCIPLED
-    tree.links.new(color, node.inputs["Base Color"])
+    tree.links.new(skin.color, node.inputs["Base Color"])
+    if skin.normal is not None:
+        tree.links.new(skin.normal, node.inputs["Normal"])
     return node.outputs[0]
 
 

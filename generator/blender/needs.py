@@ -13,19 +13,20 @@ class Needs:
     """What a look needs of materials and world besides a key light and ambient light; no other node is made.
 
     environment: a panorama may light it. occlusion: light is kept out of what is closed in. lamps: how many
-    are lit. gloss: the skin has some.
+    are lit. gloss: the skin has some. relief: it has pores and folds.
     """
 
     environment: bool = False
     occlusion: bool = False
     lamps: int = 0
     gloss: bool = False
+    relief: bool = False
 
     @classmethod
     def of(cls, look: Look, environment: bool = False) -> Needs:
         """Those of a look, which a panorama lights or not."""
         occlusion = look.preset == "fast" and look.occlusion > 0
-        return cls(environment, occlusion, len(look.lamps), look.gloss > 0)
+        return cls(environment, occlusion, len(look.lamps), look.gloss > 0, look.skin_detail > 0)
 
     def cover(self, others: Needs) -> bool:
         """Is there a node for all that others need?"""

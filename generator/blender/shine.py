@@ -47,7 +47,12 @@ def shine(
     reverse.operation = "REFLECT"
     tree.links.new(view, reverse.inputs[0])
     tree.links.new(normal, reverse.inputs[1])
-    sharpness = _sharpness(tree, gloss)
+    facing = tree.nodes.new("ShaderNodeVectorMath")
+    facing.operation = "DOT_PRODUCT"
+    tree.links.new(normal, facing.inputs[0])
+    tree.links.new(view, facing.inputs[1])
+    roughness = math_node(tree, "SUBTRACT", 1.0, gloss)
+    sharpness = _sharpness(tree, roughness)
     minus = math_node(tree, "MULTIPLY", sharpness, -1.0)
     spots: bpy.types.NodeSocket | None = None
     for name in lamps:
@@ -64,7 +69,7 @@ def shine(
     around.node.name = _MIRRORED
     if environment:
         around = vector_node(tree, "ADD", around, form_of(tree, reverse.outputs[0], _MIRRORED))
-    return vector_node(tree, "MULTIPLY", around, _fresnel(tree, normal, view, gloss))
+    return vector_node(tree, "MULTIPLY", around, _share(tree, facing.outputs["Value"], gloss, roughness))
 
 
 def set_lamp(nodes: bpy.types.Nodes, name: str, direction: Sequence[float], color: Sequence[float]) -> None:
@@ -92,28 +97,27 @@ def mirrored(light: EnvironmentLight) -> EnvironmentLight:
     return replace(light, terms=tuple(map(tuple, terms.tolist())), least=BLACK)
 
 
-def _sharpness(tree: bpy.types.NodeTree, gloss: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """s of a gloss. The roughness that artists know is 1 - gloss, and a its square (Burley, 2012)."""
-    roughness = math_node(tree, "SUBTRACT", 1.0, gloss)
-    a = math_node(tree, "MULTIPLY", roughness, roughness)
-    width = math_node(tree, "MULTIPLY_ADD", math_node(tree, "MULTIPLY", a, a), 2.0, LAMP_WIDTH)
+def _sharpness(tree: bpy.types.NodeTree, roughness: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """s of the roughness that artists know, whose square is a (Burley, SIGGRAPH 2012)."""
+    width = math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", roughness, 4.0), 2.0, LAMP_WIDTH)
     return math_node(tree, "DIVIDE", 1.0, width)
 
 
-def _fresnel(
+def _share(
     tree: bpy.types.NodeTree,
-    normal: bpy.types.NodeSocket,
-    view: bpy.types.NodeSocket,
+    facing: bpy.types.NodeSocket,
     gloss: bpy.types.NodeSocket,
+    roughness: bpy.types.NodeSocket,
 ) -> bpy.types.NodeSocket:
-    """Schlick's, which rises to the gloss squared: what is rough mirrors little at its rim. 0 without."""
-    cosine = tree.nodes.new("ShaderNodeVectorMath")
-    cosine.operation = "DOT_PRODUCT"
-    tree.links.new(normal, cosine.inputs[0])
-    tree.links.new(view, cosine.inputs[1])
-    away = math_node(tree, "SUBTRACT", 1.0, cosine.outputs["Value"])
+    """What of the light is mirrored at a cosine towards the viewer; nothing without gloss.
+
+    Schlick's Fresnel term, and his masking (with k = a / 2): what is rough hides itself at its rim.
+    """
+    away = math_node(tree, "SUBTRACT", 1.0, facing)
     away.node.use_clamp = True
-    rim = math_node(tree, "MAXIMUM", math_node(tree, "MULTIPLY", gloss, gloss), FACING)
-    rise = math_node(tree, "SUBTRACT", rim, FACING)
-    share = math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", away, 5.0), rise, FACING)
-    return math_node(tree, "MULTIPLY", share, math_node(tree, "GREATER_THAN", gloss, 0.0))
+    fresnel = math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", away, 5.0), 1 - FACING, FACING)
+    k = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", roughness, roughness), 0.5)
+    seen = math_node(tree, "MULTIPLY_ADD", facing, math_node(tree, "SUBTRACT", 1.0, k), k)
+    masked = math_node(tree, "DIVIDE", math_node(tree, "MULTIPLY", facing, fresnel), seen)
+    masked.node.use_clamp = True
+    return math_node(tree, "MULTIPLY", masked, math_node(tree, "GREATER_THAN", gloss, 0.0))

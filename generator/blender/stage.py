@@ -65,7 +65,7 @@ class Stage:
         scene.camera = self._camera
         _set_render(scene, look, threads)
         self._seen_by: Camera | None = None
-        self._lit: tuple[Look, EnvironmentLight | None] | None = None
+        self._lit: tuple[Look, EnvironmentLight | None, float] | None = None
 
     def fits(self, look: Look, environment: bool = False) -> bool:
         """Can this stage show a look, lit by a panorama or not?
@@ -95,9 +95,12 @@ class Stage:
         if view.camera != self._seen_by:
             set_camera(self.scene, self._camera, view.camera)
             self._seen_by = view.camera
-        if (view.look, environment) != self._lit:
-            self._light.set(view.look, environment)
-            self._lit = view.look, environment
+        # Only relief asks for it, and what stays as it was is not compiled again.
+        pixel_mm = view.camera.view_mm / view.camera.width if view.look.skin_detail else 1.0
+        lit = view.look, environment, pixel_mm
+        if lit != self._lit:
+            self._light.set(*lit)
+            self._lit = lit
 
     def hang(self, worn: Mapping[str, HeadMesh]) -> None:
         """Have these things at hand, by their package, and no others."""
@@ -212,7 +215,7 @@ def _build_object(name: str, mesh: HeadMesh, fast: FastLight | None, needs: Need
     made.update(calc_edges=True)
     for material in mesh.materials:
         made.materials.append(
-            build_material(material, fast, has_vertex_colors=mesh.vertex_colors is not None)
+            build_material(material, fast, needs, has_vertex_colors=mesh.vertex_colors is not None)
         )
     return bpy.data.objects.new(name, made)
 

@@ -14,11 +14,11 @@ from typing import Annotated
 import typer
 
 from generator import __version__
-from generator.cli import blender, build, export, heads, preview, replay, upgrade, verify
+from generator.cli import ablate, blender, build, export, heads, preview, replay, upgrade, verify
 from generator.cli.console import err, say
 from generator.errors import HeadturnError
 
-COMMANDS = (build, verify, preview, export, replay, upgrade, heads, blender)
+COMMANDS = (build, verify, preview, export, ablate, replay, upgrade, heads, blender)
 """Modules whose ``register`` adds commands."""
 
 EXTRAS = {

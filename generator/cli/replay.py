@@ -14,7 +14,9 @@ from generator.cli.console import BlenderOption, JsonFlag, say
 
 def replay(
     folder: Annotated[Path, typer.Argument(help="A dataset made by headturn build.")],
-    sample_id: Annotated[str, typer.Argument(help="Its row, such as p0003/neutral/y+30_p-10_r+0.")],
+    sample_id: Annotated[
+        str, typer.Argument(help="Its row, such as p0003/neutral/y+30_p-10_r+0, or a twin: …+0~light.")
+    ],
     heads: Annotated[Path | None, typer.Option(help="Where the head source lies now, if it moved.")] = None,
     picture: Annotated[Path | None, typer.Option("--out", help="Write the new image there.")] = None,
     blender: BlenderOption = None,

@@ -6,13 +6,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from generator.dataset.format.dataset_poses import read_dataset_poses
 from generator.dataset.format.heads_table import read_heads
 from generator.dataset.format.manifest import read_manifest
 from generator.dataset.format.open import dataset_topology
-from generator.dataset.proof.choose import choose_rows
+from generator.dataset.proof.choose import choose_rows, choose_twins
 from generator.dataset.proof.context import known_config
 from generator.dataset.proof.verify_report import Check, Deep, VerifyReport
 from generator.execution.replay import replay_samples
@@ -39,7 +40,7 @@ def look_deep(
     """The report of :func:`generator.dataset.proof.verify.verify_dataset` with what count rows show.
 
     Each is decoded, measured and rendered again; see :func:`generator.execution.replay.replay_samples`
-    for heads, blender, workers and on_image. count: None for all rows. seed: see
+    for heads, blender, workers and on_image. count: None for all rows, and all twins. seed: see
     :func:`generator.dataset.proof.choose.choose_rows`. on_start: called with the number of rows.
     Rows that could not be rendered are told in ``report.deep``. A report that is not ok comes back with
     the check not done: images of a dataset that contradicts itself prove nothing.
@@ -57,13 +58,18 @@ def look_deep(
     config = known_config(manifest, root)
     check.add(_detector_problems(config.landmarks, dataset_topology(root, manifest).name))
     chosen = poses.rows if count is None else min(count, poses.rows)
+    names = choose_rows(rows, poses, count, seed)
+    every = chosen == poses.rows
+    if every and manifest.twins:
+        names = chain(names, choose_twins(config, rows, poses))
+        chosen += sum(part.rows for part in manifest.twins)
     on_start(chosen)
     decoded = rendered = 0
     left_out: Counter[str] = Counter()
     versions: dict[str, None] = {}
     found = replay_samples(
         root,
-        choose_rows(rows, poses, count, seed),
+        names,
         heads=heads,
         blender=blender,
         workers=min(workers or len(available_cores()), max(chosen, 1)),
@@ -82,7 +88,7 @@ def look_deep(
     check.done = True
     deep = Deep(
         chosen=chosen,
-        all_rows=chosen == poses.rows,
+        all_rows=every,
         seed=seed,
         images=manifest.images,
         decoded=decoded,

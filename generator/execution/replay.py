@@ -23,8 +23,8 @@ from generator.dataset.format.part import read_part
 from generator.dataset.proof.compare import row_differences
 from generator.dataset.proof.context import known_config
 from generator.dataset.proof.stored import Stored, read_stored
-from generator.errors import HeadturnError, UsageError, WorkerError
-from generator.escape import printable
+from generator.errors import DatasetError, HeadturnError, UsageError, WorkerError
+from generator.escape import printable, quoted
 from generator.execution.build.units import build_order
 from generator.execution.executors.executor import Executor
 from generator.execution.executors.open import open_executor
@@ -36,6 +36,8 @@ from generator.heads.placement import Placement
 from generator.messages import BuildOrder, Built, VersionsOrder, expect
 from generator.picture.settled import check_files
 from generator.plan.config import BuildConfig
+from generator.plan.factors import FACTORS
+from generator.plan.twins import plan_twins
 from generator.plan.view_plan import plan_views
 from generator.plan.views import Pose
 
@@ -176,8 +178,8 @@ class _Studio:
         """Those of some rows, in their order."""
         found: dict[str, Replay] = {}
         orders: dict[str, tuple[BuildOrder, list[Row]]] = {}
-        for key, group in groupby(rows, key=lambda row: (row["subject"], row["expression"])):
-            together = list(group)
+        for (subject, expression, _), group in groupby(rows, key=_together):
+            together, key = list(group), (subject, expression)
             try:
                 head = self._heads.of(key)
                 if isinstance(closed := self._lanes(), HeadturnError):
@@ -211,17 +213,23 @@ class _Studio:
             yield found[row["sample_id"]]
 
     def _order(self, key: tuple[str, str], head: Head, rows: Sequence[Row], unit: str) -> BuildOrder:
-        """The build order of some poses of a head, with what placing it found at the time."""
+        """The build order of some rows of a head, or of twins, with what placing it found at the time."""
         row, config = self._heads.rows[key], self._config
         anchors = self._anchors.get(key)
         points = np.full((self._points, 3), np.nan) if anchors is None else anchors.points
         poses: list[Pose] = [(r["yaw_deg"], r["pitch_deg"], r["roll_deg"]) for r in rows]
         indices = tuple((r["yaw_index"], r["pitch_index"], r["roll_index"]) for r in rows)
-        views = plan_views(config, head.name, row.radius_mm, poses)
+        _, _, factor = _together(rows[0])
+        if factor and factor not in FACTORS:
+            raise DatasetError(f"{self._root}: there is no factor {quoted(factor)}; see `headturn verify`")
+        if factor:
+            views = plan_twins(config, head.name, row.radius_mm, poses, factor)
+        else:
+            views = plan_views(config, head.name, row.radius_mm, poses)
         root = self._scratch / unit
         root.mkdir()
         order = build_order(head, _placement(row), points, row.split, views, indices, config, root)
-        return replace(order, unit=unit, images="embedded")
+        return replace(order, unit=unit, images="embedded", factor=factor)
 
     def _stored(self, row: Row) -> Stored:
         return read_stored(self._root, row, self._manifest.images, self._config.dataset)
@@ -242,6 +250,11 @@ class _Studio:
         ]
         name, same = row["sample_id"], not differences
         return Replay(name, same, tuple(differences), tuple(changed), stored.compared(), stored.decoded)
+
+
+def _together(row: Row) -> tuple[str, str, str]:
+    """What rows of one order share: subject, expression and, of twins, the factor."""
+    return row["subject"], row["expression"], row.get("factor", "")
 
 
 def _open_lanes(

@@ -131,6 +131,13 @@ def framing_lens(
     return SENSOR_MM / 2 / reach
 
 
+def framed_margin(
+    radius_mm: float, lens_mm: float, distance_mm: float, projection: Projection = "perspective"
+) -> float:
+    """The margin that a lens at a distance leaves: the other inverse of :func:`framing_distance`."""
+    return distance_mm / framing_distance(radius_mm, lens_mm, 1.0, projection)
+
+
 def isotropic_pixels(
     points_mm: np.ndarray, matrix: np.ndarray, translation_mm: np.ndarray, projection: Sequence[str]
 ) -> np.ndarray:

@@ -3,25 +3,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 
 from generator.heads.mesh import HeadMesh, Material
-from generator.labels import BEARD, BROWS, CLOTHES, EYES, GLASSES, HAIR, HEADWEAR, LIPS, SKIN, TEETH
-
-_NAMES = (
-    (BROWS, r"brow|lash"),
-    (BEARD, r"beard|moustache|mustache"),
-    (EYES, r"eye(?!brow|lash|lid)|cornea|iris|sclera|pupil"),
-    (TEETH, r"teeth|tooth|tongue|gum|mouth"),
-    (GLASSES, r"glasses|spectacles"),
-    (HAIR, r"hair|scalp"),
-    (HEADWEAR, r"hat\b|cap\b|helmet"),
-    (CLOTHES, r"cloth|shirt|suit|collar|top\b|dress"),
-)
-"""Words in the name of a material, the first that is there."""
+from generator.labels import BROWS, EYES, LIPS, SKIN, TEETH, named
 
 # Contours of MediaPipe Face Mesh, in order.
 _LIPS = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
@@ -49,7 +36,7 @@ DEEP_MM, BEFORE_MM = 20.0, 8.0
 
 def name_label(material: Material) -> str:
     """What a material is by its name; skin, where that does not say."""
-    return next((label for label, words in _NAMES if re.search(words, material.name.lower())), SKIN)
+    return named(material.name)
 
 
 def labelled(mesh: HeadMesh, points: np.ndarray) -> HeadMesh:

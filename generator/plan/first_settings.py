@@ -20,13 +20,16 @@ FIRST_SETTINGS = {
 
 
 def common_values(configuration: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """What all parts of a dataset share: its configuration without heads and poses, which may grow.
+    """What all parts of a dataset share: its configuration without what may grow: heads, poses, twins.
 
     A later setting that has its default is left out, so that parts which were built before it agree.
     """
     defaults = {known.name: plain(known.default) for known in all_settings()}
+    of_rows = {known.name for known in all_settings() if known.info.grows}
 
     def counts(section: str, key: str, value: Any) -> bool:
+        if f"{section}.{key}" in of_rows:
+            return False
         if key in FIRST_SETTINGS.get(section, ()):
             return True
         return f"{section}.{key}" not in defaults or plain(value) != defaults[f"{section}.{key}"]

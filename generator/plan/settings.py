@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 
 from generator import registries
 from generator.limits import MAX_HEADS, MAX_POSES, MAX_SEED
+from generator.plan.factors import factor_choices
 from generator.plan.render_settings import Lens as Lens
 from generator.plan.render_settings import Look as Look
 from generator.plan.render_settings import Projection as Projection
@@ -179,6 +180,13 @@ class Dataset:
         0.0, "Share of the subjects that go to the validation split", low=0, high=1, label="Validation",
         content=False,
     )  # fmt: skip
+    twins: tuple[str, ...] = setting(
+        (), "Factors, with commas: each gives rows a twin, the same head and pose with that factor changed",
+        choices=factor_choices(), grows=True, content=False,
+    )  # fmt: skip
+    twins_share: float = setting(
+        1.0, "Share of the rows that get a twin of each factor", low=0, high=1, grows=True, content=False
+    )
     unit_size: int = setting(
         100, "Poses that are rendered and written together", low=1, high=100_000, content=False
     )

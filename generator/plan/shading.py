@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 from generator.plan.setting import setting
 
@@ -49,6 +50,9 @@ def _warmth(lamp: int) -> float:
     )  # fmt: skip
 
 
+T = TypeVar("T", bound="Shading")
+
+
 @dataclass(frozen=True)
 class Shading:
     """Lamps, and how surfaces answer light; with the defaults as in every release before 1.3."""
@@ -75,6 +79,11 @@ class Shading:
         low=0, high=1, label="Gloss", varies=True, since="1.3.0",
     )  # fmt: skip
 
+    skin_detail: float = setting(
+        0.0, "Relief of the skin, from furrows of 2.5 mm to pores, as far as pixels are fine: 1 is skin",
+        low=0, high=4, label="Skin detail", varies=True, since="1.3.0",
+    )  # fmt: skip
+
     @property
     def lamps(self) -> tuple[Lamp, ...]:
         """Those that are lit."""
@@ -84,3 +93,9 @@ class Shading:
         for lamp in LAMPS:
             names = ("yaw_deg", "pitch_deg", "strength", "warmth")
             yield Lamp(*(getattr(self, f"lamp{lamp}_{name}") for name in names))
+
+
+def unshaded(look: T) -> T:
+    """A look with the defaults of all this."""
+    plain: dict[str, Any] = {one.name: one.default for one in fields(Shading)}
+    return replace(look, **plain)

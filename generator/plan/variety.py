@@ -22,7 +22,7 @@ _PHOTO: dict[str, object] = {
     "environment_strength": "log-uniform:0.6,1.5",
     "environment_key": "choice:0,0,0,0.3",
     "backdrop": "choice:environment,environment,noise,plain",
-    "background": ["normal:0.6,0.25", "normal:0.6,0.25", "normal:0.6,0.25"],
+    "background": ["normal:0.65,0.13", "normal:0.65,0.13", "normal:0.65,0.13"],
     "exposure_ev": "normal:0,0.4",
     "warmth": "normal:0,0.25",
     "contrast": "normal:0.1,0.25",

@@ -83,12 +83,16 @@ def plan_views(config: Planned, head: str, radius_mm: float, poses: Sequence[Pos
         return Views(tuple(poses), (framed_camera(render, radius_mm),), (render.look,))
     views = []
     for pose in poses:
-        one = drawn_render(config, head, pose)
-        # Where nothing is random, views need no seed, and units have the name of any other.
-        seed = view_seed(config.poses.seed, head, pose) if _is_random(one) else 0
-        view = View(pose, framed_camera(one, radius_mm), one.look, seed)
-        views.append(_drawn(view, config.poses.seed, head))
+        views.append(plan_view(config, drawn_render(config, head, pose), head, radius_mm, pose))
     return Views.of(views)
+
+
+def plan_view(config: Planned, render: Render, head: str, radius_mm: float, pose: Pose) -> View:
+    """The view of a head at a pose with the settings of its image, as :func:`drawn_render` draws them."""
+    # Where nothing is random, views need no seed, and units have the name of any other.
+    seed = view_seed(config.poses.seed, head, pose) if _is_random(render) else 0
+    view = View(pose, framed_camera(render, radius_mm), render.look, seed)
+    return _drawn(view, config.poses.seed, head)
 
 
 def _is_random(render: Render) -> bool:

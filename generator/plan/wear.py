@@ -15,28 +15,17 @@ OWN, NOTHING = "own", "none"
 
 STYLES: dict[str, tuple[str, ...]] = {
     "hair": (
-        OWN,
-        "buzz",
-        "short",
-        "parted",
-        "slick",
-        "fringe",
-        "bob",
-        "long",
-        "curly",
-        "afro",
-        "bun",
-        "ponytail",
+        OWN, "buzz", "short", "parted", "slick", "fringe", "bob", "long", "curly", "afro", "bun", "ponytail",
     ),
-    "brows": (OWN, "natural"),
-    "beard": (OWN, "full"),
+    "brows": (OWN, "natural", "thin", "thick"),
+    "beard": (OWN, "stubble", "moustache", "goatee", "full", "long"),
     "glasses": (NOTHING, "round", "square", "aviator", "browline", "rimless", "cat-eye"),
     "headwear": (NOTHING, "cap", "beanie", "brimmed", "headscarf", "headband", "hard-hat"),
     "headphones": (NOTHING, "over-ear", "on-ear", "earbuds"),
     "mask": (NOTHING, "medical", "cloth", "ffp2"),
-    "clothes": (NOTHING, "crew"),
+    "clothes": (NOTHING, "crew", "shirt", "turtleneck", "hoodie", "suit"),
     "occluder": (NOTHING, "hand", "phone", "mug", "microphone", "paper"),
-}
+}  # fmt: skip
 """Kind -> its styles, of which the first is the default and adds nothing."""
 
 

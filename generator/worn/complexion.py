@@ -18,8 +18,14 @@ from generator.worn.fit import Fit
 PIXELS = 512
 """Textures are looked at in this size."""
 
-PAINTED = 0.62
-"""A crown darker than this share of the face has hair."""
+BEARD = 0.4
+"""Skin that differs more from the cheeks, added over the channels, is not skin."""
+
+DYED = 0.35
+"""How often hair is not of the colour that goes with brows and beard."""
+
+PAINTED, DARK = 0.72, 1.25
+"""A crown darker than this share of the face, and than this, added over the channels, has hair."""
 
 HAIR = {
     "black": (0.060, 0.052, 0.050),
@@ -54,7 +60,8 @@ class Complexion:
     @property
     def painted(self) -> bool:
         """Is the crown so much darker than the face that it is no stubble?"""
-        return float(self.crown.sum()) < PAINTED * float(self.forehead.sum())
+        crown = float(self.crown.sum())
+        return crown < PAINTED * float(self.forehead.sum()) and crown < DARK
 
 
 def complexion(fit: Fit) -> Complexion:
@@ -70,20 +77,36 @@ def complexion(fit: Fit) -> Complexion:
     found = np.where(np.isfinite(found), found, skin)
     above = surface_colors(fit, crown, np.tile([0.0, -1.0, 0.0], (len(crown), 1)))
     below = surface_colors(fit, neck, np.tile(-front, (len(neck), 1)))
-    return Complexion(found[0], found[1:].mean(axis=0), _median(below, skin), _median(above, found[0]))
+    cheek = found[1:].mean(axis=0)
+    throat = _median(below, cheek)
+    # A beard that is painted below the chin is no skin.
+    throat = throat if np.abs(throat - cheek).sum() < BEARD else cheek
+    return Complexion(found[0], cheek, throat, _median(above, found[0]))
 
 
 def hair_color(look: Complexion, rng: np.random.Generator) -> np.ndarray:
-    """Colour of hair, sRGB [3]: the painted one, which brows go with, or else one that goes with the skin."""
-    odds, shade = rng.random(), rng.uniform(0.85, 1.2)
+    """Colour of hair, sRGB [3]: the painted one, which brows go with; else mostly the natural one."""
+    dyed, odds = rng.random() < DYED, rng.random()
+    natural = natural_hair_color(look, rng)
+    # Paint is darkest between the strands, and hair in the light is not.
+    return 1.12 * natural + 0.01 if look.painted or not dyed else _some_color(look, odds)
+
+
+def natural_hair_color(look: Complexion, rng: np.random.Generator) -> np.ndarray:
+    """Colour of a head's hair, brows and beard, sRGB [3], a little lighter or darker from draw to draw."""
+    shade = rng.uniform(0.88, 1.1)
     if look.painted:
-        # Paint is darkest between the strands, and hair in the light is not.
-        return np.clip(look.crown * 1.15 * shade + 0.012, 0, 0.9)
+        return np.clip(look.crown * shade, 0, 0.85)
+    # The same for all that grows on a head, whatever else is drawn.
+    own = np.random.default_rng([*(look.forehead * 255).astype(int), *(look.cheek * 255).astype(int)])
+    return np.clip(0.95 * _some_color(look, own.random()) * shade, 0, 0.85)
+
+
+def _some_color(look: Complexion, odds: float) -> np.ndarray:
     fair = float(np.clip((look.forehead @ [0.3, 0.59, 0.11] - 0.42) / 0.2, 0, 1))
     share = {name: fair * _FAIR_SKIN[name] + (1 - fair) * _DARK_SKIN.get(name, 0.0) for name in HAIR}
     edges = np.cumsum(list(share.values()))
-    name = list(HAIR)[int(np.searchsorted(edges / edges[-1], odds))]
-    return np.clip(np.array(HAIR[name]) * shade, 0, 0.9)
+    return np.array(HAIR[list(HAIR)[int(np.searchsorted(edges / edges[-1], odds))]])
 
 
 def surface_colors(fit: Fit, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from generator.worn.cuts import Cut, draw_cut
 from generator.worn.fit import CannotWear, Fit, Kind
 from generator.worn.gathered import gathered
 from generator.worn.growing import Level, Locks, grow, smooth
-from generator.worn.skull import Skull, find_skull
+from generator.worn.skull import Skull, find_skull, is_hair
 from generator.worn.strips import Piece, across, join, strips, worn_mesh
 from generator.worn.under import Rim
 
@@ -39,7 +39,7 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     headwear = fit.others.get("headwear", NOTHING)
     if headwear in COVERS:
         raise CannotWear(f"a {headwear} covers it")
-    if style != "long" and any(_is_hair(material) for material in fit.mesh.materials):
+    if style != "long" and any(is_hair(material) for material in fit.mesh.materials):
         raise CannotWear("the head has long hair of its own")
     skull = find_skull(fit)
     cut = draw_cut(style, rng)
@@ -58,10 +58,6 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     if cut.comb == "gather":
         pieces.append(_strips(skull, cut, gathered(skull, cut, rng), color, rng))
     return worn_mesh((Material("worn hair", tuple(color.tolist()), label=HAIR, gloss=GLOSS), join(pieces)))
-
-
-def _is_hair(material: Material) -> bool:
-    return material.label == HAIR or material.name == "hair"
 
 
 def _undercoat(

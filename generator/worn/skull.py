@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,6 +11,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter, grey_opening, map_coordinates, maximum_filter
 
+from generator.heads.mesh import Material
+from generator.heads.surroundings import with_triangles
+from generator.labels import HAIR
 from generator.worn.fit import CannotWear, Fit
 
 TURNS, RISES = 121, 61
@@ -219,3 +222,14 @@ def _hairline(fit: Fit, centre: np.ndarray, ears: Ears, scale: float) -> np.ndar
         turn *= np.pi / turn[-1] if turn[-1] > np.pi else 1.0
         sides.append(PchipInterpolator(turn, rise)(np.abs(_TURN)))
     return np.where(_TURN < 0, sides[0], sides[1])
+
+
+def without_hair(fit: Fit) -> Fit:
+    """A head without the long hair that is a part of its mesh."""
+    hair = np.array([is_hair(material) for material in fit.mesh.materials])[fit.mesh.material_index]
+    return replace(fit, mesh=with_triangles(fit.mesh, ~hair)) if hair.any() else fit
+
+
+def is_hair(material: Material) -> bool:
+    """Is it hair that hangs from a head?"""
+    return material.label == HAIR or material.name == "hair"

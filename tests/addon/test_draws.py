@@ -86,7 +86,7 @@ def test_every_draw_of_a_look_is_listed() -> None:
     told = dict(look.values())
     assert len(told) == len(drawn) == len([one for one in VARIETY["photo"].values() if one is not True])
     assert told["Distance"] == f"{drawn['distance_mm']:.6g} mm" and told["Light Yaw"].endswith("°")
-    assert told["Background"].count(", ") == 2
+    assert told["Background"] == " ".join(f"{one:.2f}" for one in drawn["background"])
 
 
 @pytest.mark.parametrize(

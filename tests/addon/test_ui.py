@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in a real window, with real clicks: four sittings, each in a Blender of its own.
+"""The panel in a real window, with real clicks: five sittings, each in a Blender of its own.
 
 Screenshots stay in .test-output/addon.
 """
@@ -14,7 +14,9 @@ import pytest
 from real_blender import ROOT, RealBlender
 
 from generator.dataset.proof.verify import verify_dataset
+from generator.picture.settled import settled
 from generator.plan.config import load_config
+from generator.plan.view_plan import drawn_values
 
 OUT = ROOT / ".test-output" / "addon"
 SITTINGS = Path(__file__).with_name("sittings")
@@ -47,6 +49,15 @@ def test_heads_are_loaded_and_turned(real_blender: RealBlender) -> None:
 
 def test_pictures_are_what_the_build_would_make(real_blender: RealBlender) -> None:
     sit(real_blender, "pictures")
+
+
+def test_the_dice_show_the_looks_of_a_build(real_blender: RealBlender) -> None:
+    out = sit(real_blender, "looks")
+    facts = json.loads((out / "facts.json").read_text(encoding="utf-8"))
+    config = settled(load_config(None, {"render": {"variety": "photo"}, "poses": {"seed": facts["seed"]}}))
+    yaw, pitch, roll = facts["pose"]
+    assert facts["drawn"] == drawn_values(config, facts["head"], (yaw, pitch, roll))
+    assert len(facts["drawn"]) > 15
 
 
 def test_datasets_are_built_continued_and_refused(real_blender: RealBlender) -> None:

@@ -75,6 +75,12 @@ def head(placed_head: PlacedHead, tmp_path_factory: pytest.TempPathFactory) -> P
 
 RENDER = ("Lens", "Look", "Render")
 
+DRAWN = {
+    "lens_mm": "head:uniform:28,135",
+    "background": ["uniform:0,1", 0.123456789, 0.5],
+    "backdrop": "choice:plain,noise",
+}
+
 LINES = {
     "Look": """
     exposure: float = setting(0.0, "Exposure", unit="stops", low=-5, high=5, label="Exposure")
@@ -127,6 +133,8 @@ def test_the_extension_in_a_bpy_wheel(python: str, extension_zip: Path, head: Pa
         heads, poses = file.stem.split("-")
         config = load_config(None, {**FULL, "heads": SOURCES[heads], "poses": PLANS[poses]})
         file.write_text(config_toml(config), encoding="utf-8")
+    files.append(tmp_path / "full-drawn.toml")
+    files[-1].write_text(config_toml(load_config(None, {"render": DRAWN})), encoding="utf-8")
     run_in_wheel(python, "wheel_session.py", extension_zip, head, tmp_path, profile=tmp_path / "profile")
     # What the panel saves is what it was given, to the last digit, or the command line's defaults.
     assert load_config(tmp_path / "saved-defaults.toml", {}) == BuildConfig()

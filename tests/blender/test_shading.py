@@ -12,6 +12,7 @@ import pytest
 from panoramas import even, write_exr
 from test_render import sphere
 
+from generator.dataset.format.passes import read_channels
 from generator.execution.lanes.renderer import Renderer
 from generator.execution.lanes.shots import Shots
 from generator.geometry.camera import Camera
@@ -33,15 +34,15 @@ X, Y = np.meshgrid(np.arange(34, 63, 4), np.arange(34, 63, 4))
 """Pixels well within the ball."""
 
 
-def ball(folder: Path, openness: float | None = None, **more: Any) -> Path:
+def ball(folder: Path, openness: float | None = None, scale: float = 1.0, **more: Any) -> Path:
     """A smooth ball that sends back a quarter of the light, as a package."""
-    vertices, triangles = sphere((0, 0, 0), RADIUS)
+    vertices, triangles = sphere((0, 0, 0), scale * RADIUS)
     display = 1.055 * ALBEDO ** (1 / 2.4) - 0.055
     index = np.zeros(len(triangles), np.int32)
-    skin = Material("skin", base_color=(display,) * 3, **more)
+    skin = Material(**{"name": "skin", "base_color": (display,) * 3, **more})
     open_ = None if openness is None else np.full(len(vertices), openness, np.float32)
     mesh = HeadMesh(vertices, triangles.astype(np.int32), None, None, index, (skin,), openness=open_)
-    path = folder / f"ball-{openness}-{more}.npz"
+    path = folder / f"ball-{openness}-{scale}-{more}.npz"
     save_package(mesh, path)
     return path
 
@@ -89,8 +90,9 @@ def spot(gloss: float, lamp: np.ndarray) -> np.ndarray:
     facing = (normal * view).sum(-1)
     mirrored = 2 * facing[..., None] * normal - view
     sharp = 1 / (2 * (1 - gloss) ** 4 + LAMP_WIDTH)
-    fresnel = FACING + (max(gloss**2, FACING) - FACING) * (1 - facing) ** 5
-    return fresnel * sharp / 2 * np.exp(sharp * (mirrored @ lamp - 1))
+    k = (1 - gloss) ** 2 / 2
+    share = (FACING + (1 - FACING) * (1 - facing) ** 5) * facing / (facing * (1 - k) + k)
+    return share * sharp / 2 * np.exp(sharp * (mirrored @ lamp - 1))
 
 
 def half_lambert(look: Look) -> np.ndarray:
@@ -174,7 +176,8 @@ def test_materials_shine_as_what_they_are() -> None:
     assert of("skin", 0.0) == of("eye", 0.0) == 0.0
     assert of("skin", 0.4) == 0.4 and of("Face_mat", 0.4) == 0.4
     assert of("eye", 0.4) == of("Eye_Left", 0.2) == of("cornea", 0.3) == 0.9
-    assert of("x", 0.4, label="eyes") == 0.9 and of("x", 0.4, label="lips") == pytest.approx(0.55)
+    # Labels come with the pass segmentation, and a pass changes no picture.
+    assert of("skin", 0.4, label="eyes") == of("skin", 0.4, label="lips") == 0.4
     assert of("eyelash", 0.4) == of("Eyebrows", 0.4) == of("hair", 0.4) == of("x", 0.4, label="clothes") == 0
     assert of("upper_teeth", 0.4) == 0.75
     # What is worn says itself what it is.
@@ -198,7 +201,57 @@ def test_what_has_a_gloss_of_its_own_needs_no_setting(shots: Shots, folder: Path
     assert to_linear(shiny).max() > to_linear(flat).max() + 0.1
 
 
+def roughness(image: np.ndarray) -> float:
+    """How much the middle of the ball differs from pixel to pixel, over its light."""
+    light = to_linear(image)[38:58, 38:58, 1]
+    return float(np.abs(np.diff(light, axis=1)).mean() / light.mean())
+
+
+@pytest.mark.parametrize("preset", ["fast", "quality"])
+def test_skin_has_a_relief_that_turns_with_the_head(shots: Shots, folder: Path, preset: str) -> None:
+    look = Look(preset=preset, samples=None if preset == "fast" else 256, gloss=0.4)
+    rough = replace(look, skin_detail=3.0)
+    package = ball(folder)
+    smooth, near = taken(shots, package, look, rough)
+    assert roughness(near) > roughness(smooth) + 0.01
+    assert to_linear(near).mean() == pytest.approx(to_linear(smooth).mean(), rel=0.03)
+    turned = View((40.0, 0.0, 0.0), CAMERA, rough)
+    [other] = shots.take(package, Views.of([turned]), Folders())
+    assert np.abs(other[38:58, 38:58].astype(int) - near[38:58, 38:58]).mean() > 1.0
+
+
+def test_what_is_finer_than_pixels_fades(shots: Shots, folder: Path) -> None:
+    """The same image of a ball that is as large as a house: no noise of single pixels."""
+    camera = Camera.square(96, 85.0, 700.0 * 30)
+    views = Views.of([View((0.0, 0.0, 0.0), camera, Look(skin_detail=detail)) for detail in (0.0, 3.0)])
+    smooth, rough = shots.take(ball(folder, scale=30.0), views, Folders())
+    assert roughness(rough) < roughness(smooth) + 0.002
+
+
+def test_what_is_no_skin_is_smooth(shots: Shots, folder: Path) -> None:
+    for name, label in (("eye", "skin"), ("frame", "glasses")):
+        package = ball(folder, name=name, label=label)
+        smooth, rough = taken(shots, package, Look(), Look(skin_detail=3.0))
+        np.testing.assert_array_equal(smooth, rough)
+
+
+@pytest.mark.parametrize("preset", ["fast", "quality"])
+def test_passes_know_nothing_of_it(renderer: Renderer, folder: Path, preset: str) -> None:
+    found = []
+    shaded = Look(preset=preset, skin_detail=3.0, gloss=0.6, occlusion=1.0, lamp1_strength=1.0)
+    for look in (Look(preset=preset), shaded):
+        views = Views.of([View((10.0, 5.0, 0.0), CAMERA, look)])
+        [path] = renderer.render(ball(folder, 0.5), views, passes=["depth", "normal"])
+        found.append(read_channels(path))
+        path.unlink()
+    for name, values in found[0].items():
+        if "Combined" not in name:
+            np.testing.assert_array_equal(values, found[1][name], err_msg=name)
+
+
 SHADED = (
+    Look(skin_detail=1.0, gloss=0.5),
+    Look(skin_detail=1.0, preset="quality", samples=2),
     Look(gloss=0.5),
     Look(lamp1_strength=0.5, lamp2_strength=0.5, environment="city", gloss=0.6),
     Look(lamp3_strength=0.8, lamp3_warmth=2.0),
@@ -221,7 +274,9 @@ def test_what_a_look_does_not_need_changes_no_pixel(shots: Shots, folder: Path) 
     # And it does something: no look is another's.
     for k, look in enumerate(SHADED):
         if look.preset == "fast":
-            less = replace(look, occlusion=0.0, gloss=0.0, lamp1_strength=0.0, lamp3_strength=0.0)
+            less = replace(
+                look, occlusion=0.0, gloss=0.0, lamp1_strength=0.0, lamp3_strength=0.0, skin_detail=0.0
+            )
             assert not np.array_equal(shaded[k], taken(shots, package, less)[0])
 
 

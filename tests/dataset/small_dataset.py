@@ -7,8 +7,10 @@ import io
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from PIL import Image, ImageDraw
 
 from generator.dataset.format.anchors_table import HeadAnchors, write_anchors
@@ -25,10 +27,12 @@ from generator.dataset.format.unit_rows import UnitRows
 from generator.dataset.show.card import write_card
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import rotation_from_angles
+from generator.plan.config import recorded_config
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import PosePlans, poses_csv
 from generator.plan.poses import PosePlan, grid_plan
 from generator.plan.settings import Look
+from generator.plan.twins import plan_twins
 
 VERSIONS = {"headturn": "0.0.0", "numpy": np.__version__}
 CAMERA = Camera.square(64, lens_mm=85.0, distance_mm=700.0)
@@ -76,17 +80,27 @@ def draw_face(rotation: np.ndarray, camera: Camera, tone: tuple[int, int, int]) 
     return file.getvalue()
 
 
-def unit_rows(head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAMERA) -> UnitRows:
-    """One unit: the chosen poses of one head. Large yaw with pitch up is a miss."""
+TWIN_SHIFT_PX = (3.0, 4.0)
+"""How far landmarks are off in a twin."""
+
+
+def unit_rows(
+    head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAMERA, factor: str = ""
+) -> UnitRows:
+    """One unit: the chosen poses of one head. Large yaw with pitch up is a miss.
+
+    factor: of twins; every large yaw is a miss, and landmarks are off by TWIN_SHIFT_PX.
+    """
     angles = plan.angles_deg[chosen]
     rotations = rotation_from_angles(angles)
-    detected = ~((angles[:, 0] >= 30) & (angles[:, 1] >= 20))
+    detected = ~((angles[:, 0] >= 30) & ((angles[:, 1] >= 20) | bool(factor)))
     landmarks = np.full((len(angles), 468, 3), np.nan, np.float32)
     for row in np.flatnonzero(detected):
         points = face_points() @ rotations[row].T + camera.translation_mm
         scale = camera.focal_px / camera.distance_mm
         depth = (points[:, 2:] - camera.distance_mm) * scale
-        landmarks[row] = np.concatenate([camera.project(points), depth], axis=1)
+        shift = TWIN_SHIFT_PX if factor else (0, 0)
+        landmarks[row] = np.concatenate([camera.project(points) + shift, depth], axis=1)
     tone = (224, 190, 160) if head.subject < "s2" else (150, 105, 80)
     return UnitRows(
         subject=head.subject,
@@ -103,6 +117,7 @@ def unit_rows(head: HeadRow, plan: PosePlan, chosen: slice, camera: Camera = CAM
         anchors=face_anchors(),
         visible=face_visible(rotations, camera),
         images=[draw_face(rotation, camera, tone) for rotation in rotations],
+        factor=factor,
     )
 
 
@@ -140,6 +155,18 @@ def head_row(subject: str, split: str) -> HeadRow:
 HEADS = (head_row("s1", "train"), head_row("s2", "validation"))
 
 
+def twin_unit(
+    head: HeadRow, plan: PosePlan, camera: Camera, factor: str, configuration: dict
+) -> tuple[UnitRows, pa.Schema]:
+    """The twins of all rows of a head, with the looks that the configuration plans, and their schema."""
+    config = recorded_config(configuration, Path())
+    poses = [*map(tuple, plan.angles_deg.tolist())]
+    views = plan_twins(config, f"{head.subject}/{head.expression}", head.radius_mm, poses, factor)
+    rows = replace(unit_rows(head, plan, slice(None), camera, factor), looks=views.looks)
+    digest = configuration_digest(common_values(configuration))
+    return rows, part_schema(configuration["dataset"]["images"], VERSIONS, digest, twins=True)
+
+
 def build_dataset(
     root: Path,
     images: ImageMode = "files",
@@ -147,8 +174,13 @@ def build_dataset(
     plan: PosePlan = SMALL_PLAN,
     chunk: int = 10,
     camera: Camera = CAMERA,
+    twins: tuple[str, ...] = (),
+    render: dict[str, Any] | None = None,
 ) -> Manifest:
-    """A finished dataset of heads x plan, a part for every chunk of poses."""
+    """A finished dataset of heads x plan, a part for every chunk of poses.
+
+    twins: factors of the look. render: further settings of it.
+    """
     configuration = {
         "poses": {"kind": plan.kind},
         "render": {
@@ -156,8 +188,9 @@ def build_dataset(
             "lens_mm": camera.lens_mm,
             "distance_mm": camera.distance_mm,
             "projection": camera.projection,
+            **(render or {}),
         },
-        "dataset": {"images": images},
+        "dataset": {"images": images, **({"twins": [*twins]} if twins else {})},
     }
     schema = part_schema(images, VERSIONS, configuration_digest(common_values(configuration)))
     root.mkdir(parents=True)
@@ -166,7 +199,13 @@ def build_dataset(
         name = head.subject if re.fullmatch(r"\w+", head.subject, re.ASCII) else f"h{number}"
         for start in range(0, len(plan), chunk):
             unit = unit_rows(head, plan, slice(start, start + chunk), camera)
+            if render:
+                unit = replace(unit, looks=(recorded_config(configuration, root).render.look,))
             parts.append(commit_unit(unit, schema, root, f"{name}-{start}"))
+        for factor in twins:
+            parts.append(
+                commit_unit(*twin_unit(head, plan, camera, factor, configuration), root, name + factor)
+            )
     seen_by = {
         "lens_mm": camera.lens_mm,
         "distance_mm": camera.distance_mm,
@@ -181,7 +220,13 @@ def build_dataset(
     )
     (root / "poses.csv").write_text(poses_csv(PosePlans(plan)))
     manifest = Manifest(
-        VERSIONS, configuration, tuple(parts), images, len(heads), created_by="headturn build"
+        VERSIONS,
+        configuration,
+        tuple(part for part in parts if not part.of_twins),
+        images,
+        len(heads),
+        created_by="headturn build",
+        twins=tuple(part for part in parts if part.of_twins),
     )
     write_card(manifest, root)
     write_manifest(manifest, root)

@@ -6,7 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from small_dataset import build_dataset
 
+from generator.dataset.ablate.ablation import ablate_dataset
 from generator.dataset.format.compact import compact_dataset
 from generator.dataset.format.manifest import read_manifest
 from generator.dataset.proof.verify import verify_dataset
@@ -32,6 +34,18 @@ def test_the_same_rows_in_fewer_files(dataset: Path, tmp_path: Path) -> None:
     assert report.ok, report.text()
     assert verify_dataset(dataset).ok
     assert not list(tmp_path.glob(".*"))
+
+
+def test_twins_are_merged_too(tmp_path: Path) -> None:
+    build_dataset(tmp_path / "dataset", twins=("jpeg", "noise"))
+    before = read_manifest(tmp_path / "dataset")
+    after = compact_dataset(tmp_path / "dataset", tmp_path / "c", reporter=Quiet())
+    assert (len(before.twins), len(after.twins)) == (4, 2), "one a split, of both factors"
+    assert (after.digest, after.twins_digest) == (before.digest, before.twins_digest)
+    report = verify_dataset(tmp_path / "c")
+    assert report.ok, report.text()
+    before_and_after = [ablate_dataset(tmp_path / name).as_dict() for name in ("dataset", "c")]
+    assert before_and_after[0] == before_and_after[1]
 
 
 def test_parts_keep_to_the_size(dataset: Path, tmp_path: Path) -> None:

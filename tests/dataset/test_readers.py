@@ -39,7 +39,7 @@ def check_image(image: Image.Image) -> None:
 @pytest.fixture(scope="module")
 def embedded(tmp_path_factory, build) -> Path:
     root = tmp_path_factory.mktemp("readers") / "seed=7" / "subject=x" / "dataset"
-    build(root, "embedded")
+    build(root, "embedded", twins=("jpeg",))
     return root
 
 
@@ -102,6 +102,9 @@ assert {name: len(split) for name, split in rows.items()} == {"train": 18, "vali
 assert isinstance(rows["train"].features["image"], Image), rows["train"].features
 image = rows["train"][0]["image"]
 assert image.size == (64, 64) and image.getpixel((0, 0)) == (128, 128, 128)
+twins = load_dataset(sys.argv[1], "twins")
+assert all(set(twins[name]["factor"]) == {"jpeg"} for name in ("train", "validation")), twins
+assert len(twins["train"]) == 18 and twins["train"][0]["twin_of"] + "~jpeg" == twins["train"][0]["sample_id"]
 assert load_dataset(sys.argv[1], "heads")["train"]["subject"][:] == ["s1", "s2"]
 names = ("yaw_deg", "pitch_deg", "roll_deg")
 both = [rows["train"], rows["validation"]]  # not with_format("numpy"): that narrows float64 to float32

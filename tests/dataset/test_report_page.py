@@ -20,6 +20,7 @@ from known_error import SHIFT
 from scipy.spatial.transform import Rotation
 from small_dataset import CAMERA, HEADS, face_points
 
+from generator.dataset.ablate.ablation import ablate_dataset
 from generator.dataset.show.report.page import write_report
 
 pytestmark = pytest.mark.slow
@@ -187,3 +188,31 @@ def test_a_page_with_less_on_it_has_no_errors_either(tmp_path, build, monkeypatc
     assert (
         "No head of this dataset has exact landmarks" in re.sub("<script.*</script>", "", shown.stdout)
     ) == (without == "exact landmarks")
+
+
+EFFECTS = """<script>addEventListener("load", () => {
+  const changes = (card) => Object.fromEntries([...card.querySelectorAll("tr[data-change]")].map((row) =>
+    [row.dataset.measure, Number(row.dataset.change)]));
+  const seen = [...document.querySelectorAll(".effect")].map((card) =>
+    [card.dataset.effect, card.querySelectorAll("img").length, changes(card)]);
+  document.title = JSON.stringify([seen, document.documentElement.scrollWidth <= innerWidth]);
+});</script>"""
+
+
+def test_effects_of_twins_are_those_of_ablate(chromium: str, tmp_path: Path) -> None:
+    root, page = tmp_path / "dataset", tmp_path / "r.html"
+    small_dataset.build_dataset(root, twins=("jpeg", "noise"))
+    write_report(root, page)
+    page.write_text(
+        page.read_text(encoding="utf-8").replace("</body>", EFFECTS + "</body>"), encoding="utf-8"
+    )
+    shown = browse(chromium, page, tmp_path, "--window-size=600,900", "--dump-dom")
+    assert "CONSOLE" not in shown.stderr, shown.stderr
+    cards, fits = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", shown.stdout).group(1)))
+    assert fits
+    expected = {one.factor: one.judged[0] for one in ablate_dataset(root).factors}
+    assert [name for name, _, _ in cards] == list(expected) == ["jpeg", "noise"]
+    for name, pictures, changes in cards:
+        assert pictures == 2 * 2 and len(changes) == 6
+        for measure, change in changes.items():
+            assert change == pytest.approx(expected[name].of(measure).change)

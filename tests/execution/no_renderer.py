@@ -124,8 +124,14 @@ class NoRenderer:
             visible=np.zeros((count, points), dtype=bool),
             images=images,
             image_suffix=f".{order.image_format}",
+            factor=order.factor,
         )
-        schema = part_schema(cast(ImageMode, order.images), self._versions(), order.configuration_digest)
+        schema = part_schema(
+            cast(ImageMode, order.images),
+            self._versions(),
+            order.configuration_digest,
+            twins=bool(order.factor),
+        )
         check_there(Path(order.root))
         return Built(commit_unit(rows, schema, Path(order.root), order.unit), {}, self._versions())
 

@@ -28,7 +28,7 @@ def test_the_same_seed_is_the_same_look_everywhere(
     parametric_heads: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     head = parametric_heads / "s1p0000"
-    render = {"variety": "photo", "resolution": 96}
+    render = {"variety": "photo", "resolution": 96, "glasses": "choice:round"}
     (tmp_path / "one.csv").write_text("yaw_deg,pitch_deg,roll_deg\n20,-5,0\n")
     poses = {"kind": "csv", "path": str(tmp_path / "one.csv")}
     given = {"heads": {"source": str(head)}, "render": render}
@@ -39,7 +39,7 @@ def test_the_same_seed_is_the_same_look_everywhere(
     built = cv2.imread(str(tmp_path / "d" / row["image_path"]))
 
     options = ["--pose", "20,-5,0", "--variety", "photo", "--seed", SEED, "--preset", "fast", "--json"]
-    more = ["--resolution", 96, "--no-landmarks", "--out", tmp_path / "p.png"]
+    more = ["--glasses", "choice:round", "--resolution", 96, "--no-landmarks", "--out", tmp_path / "p.png"]
     monkeypatch.setattr(sys, "argv", ["headturn", "preview", *map(str, [head, *options, *more])])
     with pytest.raises(SystemExit) as ended:
         cli.main()
@@ -70,7 +70,8 @@ def test_the_same_seed_is_the_same_look_everywhere(
                 "sheet": 2,
             }
         )
-    assert answer["drawn"][1] == drawn != answer["drawn"][0]
+    assert answer["drawn"][1] == drawn != answer["drawn"][0] and drawn["glasses"] == "round"
+    assert answer["left_out"] == ["", "", ""] and row["look_left_out"] == ""
     pictures = [cv2.imread(path) for path in answer["pictures"]]
     assert np.array_equal(pictures[1], built)
     assert not np.array_equal(pictures[0], pictures[2])

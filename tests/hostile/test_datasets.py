@@ -36,6 +36,7 @@ ROWS = frozenset({"names", "sample_id", "image_path", "passes_path", "links", "a
 DOORS: dict[str, Door] = {
     "verify": Door(lambda root, out: ["verify", str(root)], ROWS),
     "report": Door(lambda root, out: ["report", str(root)], frozenset({"names", "image_path", "links"})),
+    "ablate": Door(lambda root, out: ["ablate", str(root), "--out", str(out)], frozenset({"sample_id"})),
     "compact": Door(lambda root, out: ["compact", str(root), "--out", str(out)], ROWS),
     "upgrade": Door(lambda root, out: ["upgrade", str(root), "--out", str(out)], frozenset()),
     "replay": Door(lambda root, out: ["replay", str(root), SAMPLE], frozenset()),
@@ -74,7 +75,7 @@ def test_every_command_is_a_door_or_opens_no_dataset() -> None:
 def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sound dataset."""
     root = tmp_path_factory.mktemp("template") / "dataset"
-    build_dataset(root)
+    build_dataset(root, twins=("jpeg",))
     return root
 
 

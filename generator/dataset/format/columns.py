@@ -9,6 +9,7 @@ follow from :data:`ROWS`. The columns of heads.parquet are the fields of
 from __future__ import annotations
 
 import re
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -249,3 +250,17 @@ def _row_columns() -> tuple[Column, ...]:
 
 ROWS: dict[str, Column] = {column.name: column for column in _row_columns()}
 """Every column of the rows by its name, in the order of the table."""
+
+TWINS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("twin_of", pa.string(), "sample_id of the row of which it is the twin", "identity",
+               lambda rows: rows.base_ids, since="1.3.0", guard="path"),
+        Column("factor", pa.string(), "what differs from that row, such as light", "identity",
+               lambda rows: [rows.factor] * len(rows), since="1.3.0", guard="name"),
+    )
+}  # fmt: skip
+"""What a table of twins has besides, by name."""
+
+EVERY: Mapping[str, Column] = ChainMap(ROWS, TWINS)
+"""The columns of both."""

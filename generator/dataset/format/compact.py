@@ -35,11 +35,12 @@ from generator.dataset.format.part import (
 )
 from generator.dataset.format.part_info import PartInfo
 from generator.errors import DatasetError
+from generator.plan.factors import PART_FOLDERS
 
 TARGET_BYTES = 256 * 10**6
 
 _MERGED = (
-    *("data", MANIFEST_FILE, CONFIG_FILE),
+    *(*PART_FOLDERS, MANIFEST_FILE, CONFIG_FILE),
     *(RECEIPTS_FILE, PLACED_FILE, FIRST_PLACED_FILE, LOG_FILE),
 )
 """What of a dataset's folder is written anew, or belongs to its build: the new one cannot be built on."""
@@ -69,22 +70,27 @@ def compact_dataset(
     manifest = read_manifest(source)
     with folder_beside(source, target) as work:
         parts = []
-        reporter.stage("compacting", len(manifest.parts))
-        for number, group in enumerate(_groups(manifest, part_bytes)):
+        reporter.stage("compacting", len(manifest.parts) + len(manifest.twins))
+        groups = (*_groups(manifest.parts, part_bytes), *_groups(manifest.twins, part_bytes))
+        for number, group in enumerate(groups):
             parts.append(_merge(source, work, group, number))
             reporter.advance(len(group))
         share_files(source, work, _MERGED)
-        compacted = replace(manifest, parts=tuple(parts))
-        if compacted.digest != manifest.digest:
+        compacted = replace(
+            manifest,
+            parts=tuple(part for part in parts if not part.of_twins),
+            twins=tuple(part for part in parts if part.of_twins),
+        )
+        if (compacted.digest, compacted.twins_digest) != (manifest.digest, manifest.twins_digest):
             raise DatasetError(f"{source}: its parts differ from its manifest; see `headturn verify`")
         write_manifest(compacted, work)
     return read_manifest(target)
 
 
-def _groups(manifest: Manifest, part_bytes: int) -> Iterator[list[PartInfo]]:
+def _groups(every: Sequence[PartInfo], part_bytes: int) -> Iterator[list[PartInfo]]:
     """Parts of one split that make up one new part, in the order of head and place."""
-    for split in manifest.splits:
-        parts = [part for part in manifest.parts if part.path.split("/")[1] == split]
+    for split in sorted({part.path.split("/")[1] for part in every}):
+        parts = [part for part in every if part.path.split("/")[1] == split]
         group: list[PartInfo] = []
         size = 0
         for part in sorted(parts, key=lambda part: (part.subject, part.expression, part.path)):
@@ -97,9 +103,9 @@ def _groups(manifest: Manifest, part_bytes: int) -> Iterator[list[PartInfo]]:
 
 
 def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> PartInfo:
-    split = group[0].path.split("/")[1]
+    folder, split, _ = group[0].path.split("/")
     name = hashlib.sha256("".join(part.digest for part in group).encode()).hexdigest()[:16]
-    path = work / "data" / split / f"part-{number:05d}-{name}.parquet"
+    path = work / folder / split / f"part-{number:05d}-{name}.parquet"
     schema = part_schema_of(dataset_file(source, group[0].path))
 
     def write(file: BinaryIO) -> None:
@@ -112,6 +118,6 @@ def _merge(source: Path, work: Path, group: Sequence[PartInfo], number: int) -> 
         info = check_part(temporary)
         if info.digest != add_digests(part.digest for part in group):
             raise DatasetError(f"{path}: what was read back differs from what was merged; check the disk")
-        return replace(info, path=f"data/{split}/{path.name}")
+        return replace(info, path=f"{folder}/{split}/{path.name}")
 
     return write_atomically(path, write, check, work)

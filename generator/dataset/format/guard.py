@@ -15,7 +15,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from generator.dataset.format.columns import ROWS
+from generator.dataset.format.columns import EVERY
 from generator.errors import DatasetError
 from generator.escape import quoted
 from generator.names import as_inside_path, as_name, inside
@@ -30,13 +30,13 @@ def check_texts(batch: pa.RecordBatch | pa.Table, where: object) -> None:
     Looks at the columns that are there; see ``guard`` of :class:`generator.dataset.format.columns.Column`.
     """
     for name in batch.schema.names:
-        guard = ROWS[name].guard if name in ROWS else None
+        guard = EVERY[name].guard if name in EVERY else None
         if guard is None:
             continue
         column = batch.column(name)
         if not pa.types.is_string(column.type):
             raise DatasetError(f"{where}: {name} is {column.type}, no text")
-        if guard == "path" and ROWS[name].default == "":
+        if guard == "path" and EVERY[name].default == "":
             column = pc.filter(column, pc.not_equal(column, ""))
         texts = pc.list_flatten(pc.split_pattern(column, "/")) if guard == "path" else column
         _check(name, pc.unique(texts).to_pylist(), where)

@@ -24,6 +24,7 @@ from generator.dataset.format.schema import check_schema_version, is_newer
 from generator.errors import DatasetError
 from generator.escape import printable
 from generator.names import as_name
+from generator.plan.factors import part_folder
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE
 from generator.reading import MAX_STATE_BYTES, parse_json, read_limited
@@ -32,6 +33,7 @@ from generator.sealed import SEAL, seal_of, sealed
 MANIFEST_FILE = "manifest.json"
 CONFIG_FILE, FAILURES_FILE = "config.toml", "failures.jsonl"
 _PART_PATH = re.compile(r"data/[\w+-][\w .+-]*/part-[\w .+-]+\.parquet")
+_TWINS_PATH = re.compile(_PART_PATH.pattern.replace("data", part_folder("any"), 1))
 _HASH = r"^[0-9a-f]{64}$"
 
 
@@ -49,6 +51,7 @@ class Manifest:
     tables: SHA-256 of the files of :func:`side_tables`; :func:`write_manifest` fills it in.
     files: SHA-256 of config.toml and failures.jsonl, where they are there; filled in likewise.
         None in a manifest of the first release, which covered none.
+    twins: the parts of twins of rows, which are no rows: neither counted nor digested with them.
     others: values of a later schema that we do not know, kept as they are.
     """
 
@@ -63,6 +66,7 @@ class Manifest:
     tables: dict[str, str] = field(default_factory=dict)
     files: dict[str, str] | None = None
     schema_version: str = SCHEMA_VERSION
+    twins: tuple[PartInfo, ...] = ()
     others: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -79,6 +83,11 @@ class Manifest:
     def digest(self) -> str:
         """Digest of the dataset's content, see :mod:`generator.dataset.format.digest`."""
         return add_digests(part.digest for part in self.parts)
+
+    @property
+    def twins_digest(self) -> str:
+        """The same of the twins."""
+        return add_digests(part.digest for part in self.twins)
 
     @property
     def splits(self) -> list[str]:
@@ -101,9 +110,18 @@ class Manifest:
             "configuration": self.configuration,
             "tables": self.tables,
             "parts": [asdict(part) for part in sorted(self.parts, key=lambda part: part.path)],
+            **({"twins": self._twins_dict()} if self.twins else {}),
             "created_by": self.created_by,
             **({} if self.files is None else {"files": self.files}),
             **self.others,
+        }
+
+    def _twins_dict(self) -> dict[str, Any]:
+        return {
+            "digest": self.twins_digest,
+            "rows": sum(part.rows for part in self.twins),
+            "detected_rows": sum(part.detected for part in self.twins),
+            "parts": [asdict(part) for part in sorted(self.twins, key=lambda part: part.path)],
         }
 
 
@@ -224,6 +242,15 @@ class _Images(BaseModel):
     count: int
 
 
+class _Twins(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    digest: str
+    rows: int
+    detected_rows: int
+    parts: Annotated[list[_Part], Field(min_length=1)]
+
+
 class _Stored(BaseModel):
     """manifest.json, from a file that may say anything. See :meth:`Manifest.as_dict`."""
 
@@ -244,6 +271,7 @@ class _Stored(BaseModel):
     parts: Annotated[list[_Part], Field(min_length=1)]
     created_by: str
     files: dict[str, str] | None = None
+    twins: _Twins | None = None
     sha256: str = ""
 
 
@@ -251,10 +279,18 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
     """The values without what a later schema says of a part besides."""
     if not is_newer(values["schema_version"]):
         return values
-    return {
-        **values,
-        "parts": [{name: part[name] for name in _Part.model_fields} for part in values["parts"]],
-    }
+
+    def known(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        return [{name: part[name] for name in _Part.model_fields} for part in parts]
+
+    found = {**values, "parts": known(values["parts"])}
+    if "twins" in values:
+        twins = values["twins"]
+        found["twins"] = {
+            **{name: twins[name] for name in _Twins.model_fields},
+            "parts": known(twins["parts"]),
+        }
+    return found
 
 
 def _parse(values: dict[str, Any]) -> Manifest:
@@ -262,8 +298,9 @@ def _parse(values: dict[str, Any]) -> Manifest:
     if is_newer(values["schema_version"]):
         others = {name: value for name, value in values.items() if name not in _Stored.model_fields}
     stored = _Stored.model_validate({name: value for name, value in values.items() if name not in others})
-    for part in stored.parts:
-        if not _PART_PATH.fullmatch(part.path):
+    twins = stored.twins.parts if stored.twins else []
+    for part, where in [*((p, _PART_PATH) for p in stored.parts), *((p, _TWINS_PATH) for p in twins)]:
+        if not where.fullmatch(part.path):
             raise ValueError(f"{part.path!r} is not where a part can be")
         for name in filter(None, (part.subject, part.expression)):
             as_name(name)
@@ -283,6 +320,7 @@ def _parse(values: dict[str, Any]) -> Manifest:
         tables=stored.tables,
         files=stored.files,
         schema_version=stored.schema_version,
+        twins=tuple(PartInfo(**part.model_dump()) for part in twins),
         others=others,
     )
 

@@ -26,6 +26,7 @@ from generator.dataset.format.schema import topology_of
 from generator.errors import DatasetError
 from generator.escape import printable
 from generator.landmarks.topology import FACE_MESH, Topology
+from generator.plan.factors import is_twin
 
 OPEN_PARTS = 64
 
@@ -112,10 +113,11 @@ def read_samples(root: Path, manifest: Manifest, sample_ids: Sequence[str]) -> d
     Reads only the parts of their heads. Raises DatasetError: a part is missing or damaged.
     """
     heads = {tuple(name.split("/")[:2]) for name in sample_ids}
-    parts = [p for p in manifest.parts if not p.subject or (p.subject, p.expression) in heads]
     found: dict[str, dict[str, Any]] = {}
-    for batch in read_rows(root, parts, where=pc.field("sample_id").isin(list(sample_ids))):
-        found.update((row["sample_id"], row) for row in batch.to_pylist())
+    for tables in (manifest.parts, manifest.twins if any(map(is_twin, sample_ids)) else ()):
+        parts = [p for p in tables if not p.subject or (p.subject, p.expression) in heads]
+        for batch in read_rows(root, parts, where=pc.field("sample_id").isin(list(sample_ids))):
+            found.update((row["sample_id"], row) for row in batch.to_pylist())
     return found
 
 

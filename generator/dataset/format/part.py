@@ -30,14 +30,17 @@ from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import check_name, image_mode
 from generator.dataset.format.unit_rows import UnitRows, unit_table
 from generator.errors import DatasetError
+from generator.plan.factors import part_folder
 
 ROW_GROUP = 1024
 BATCH = 256
 """Rows read at once: bounds the memory of a check when images are embedded."""
 
 
-def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
+def write_part(table: pa.Table, root: Path, split: str, unit: str, folder: str = "data") -> PartInfo:
     """Commit a table as ``data/<split>/part-<unit>.parquet`` under root, all or nothing.
+
+    folder: of :func:`generator.plan.factors.part_folder`.
 
     The file is read back and its content compared with the table before it
     takes its name.
@@ -50,17 +53,17 @@ def write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
     check_name("split", split)
     check_name("unit", unit)
     make_folder(root)
-    return _write_part(table, root, split, unit)
+    return _write_part(table, root, split, unit, folder)
 
 
-def _write_part(table: pa.Table, root: Path, split: str, unit: str) -> PartInfo:
-    path = root / "data" / split / f"part-{unit}.parquet"
+def _write_part(table: pa.Table, root: Path, split: str, unit: str, folder: str) -> PartInfo:
+    path = root / folder / split / f"part-{unit}.parquet"
 
     def check(temporary: Path) -> PartInfo:
         info = check_part(temporary)
         if info.rows != len(table) or info.digest != content_digest(table):
             raise DatasetError(f"{path}: what was read back differs from what was written; check the disk")
-        return replace(info, path=f"data/{split}/{path.name}")
+        return replace(info, path=f"{folder}/{split}/{path.name}")
 
     return write_atomically(path, lambda file: write_table(table, file), check, root)
 
@@ -82,7 +85,7 @@ def commit_unit(rows: UnitRows, schema: pa.Schema, root: Path, unit: str) -> Par
     if rows.passes is not None:
         files = zip(rows.passes_paths, rows.passes, strict=True)
         write_files({root / path: content for path, (content, _) in files}, root)
-    return _write_part(table, root, rows.split, unit)
+    return _write_part(table, root, rows.split, unit, part_folder(rows.factor))
 
 
 def iter_stored(path: Path) -> Iterator[pa.RecordBatch]:
@@ -126,7 +129,7 @@ def read_part(path: Path) -> pa.Table:
 def check_part(path: Path) -> PartInfo:
     """Read a part from the first byte to the last and say what it holds.
 
-    path: ``<dataset>/data/<split>/<name>``.
+    path: ``<dataset>/data/<split>/<name>``, or below twins.
     Raises DatasetError as :func:`iter_stored` does, or if its columns are not those of a part.
     """
     rows, detected, digests = 0, 0, [NO_ROWS]

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from generator.plan.factors import part_folder
+
 
 @dataclass(frozen=True)
 class PartInfo:
@@ -23,3 +25,8 @@ class PartInfo:
     digest: str
     subject: str
     expression: str
+
+    @property
+    def of_twins(self) -> bool:
+        """Does it hold twins of rows?"""
+        return self.path.startswith(f"{part_folder('any')}/")

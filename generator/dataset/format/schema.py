@@ -11,6 +11,7 @@ import pyarrow as pa
 from generator.dataset.format.columns import (
     ROWS,
     SCHEMA_VERSION,
+    TWINS,
     ImageMode,
     columns_at,
     version_number,
@@ -54,14 +55,17 @@ def part_schema(
     configuration_digest: str,
     topology: Topology = FACE_MESH,
     schema_version: str = SCHEMA_VERSION,
+    twins: bool = False,
 ) -> pa.Schema:
     """Schema of one part: columns in order, none nullable, and the metadata.
 
     versions: name and version of every package that decides the content.
     configuration_digest: of :func:`generator.plan.first_settings.common_values`.
     topology: what the landmarks are. schema_version: an earlier one has only the columns of its time.
+    twins: of a part of twins.
     """
-    columns = [column for column in columns_at(ROWS, schema_version) if column.is_in(images)]
+    table = {**ROWS, **TWINS} if twins else ROWS
+    columns = [column for column in columns_at(table, schema_version) if column.is_in(images)]
     metadata = {
         "headturn.schema_version": schema_version,
         "headturn.conventions": _json(conventions(topology)),

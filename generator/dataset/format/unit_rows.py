@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.format.columns import ROWS, ImageMode
+from generator.dataset.format.columns import EVERY, ImageMode
 from generator.dataset.format.schema import (
     check_name,
     image_mode,
@@ -24,6 +24,7 @@ from generator.dataset.format.schema import (
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
 from generator.landmarks.topology import FACE_MESH, Topology
+from generator.plan.factors import row_name
 from generator.plan.poses import pose_name
 from generator.plan.settings import Look
 
@@ -43,6 +44,7 @@ class UnitRows:
     passes         N multilayer OpenEXR files and the SHA-256 of their decoded floats; None
                    where no passes were asked for
     topology       what the P landmarks are
+    factor         the rows are twins, with this one changed
     left_out       of each row, what its head could not wear and why; empty where nothing was
     extra          values of columns that have no ``fill`` of their own: name -> [N, ...]
     """
@@ -64,6 +66,7 @@ class UnitRows:
     image_suffix: str = ".png"
     passes: Sequence[tuple[bytes, str]] | None = None
     topology: Topology = FACE_MESH
+    factor: str = ""
     left_out: Sequence[str] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
 
@@ -95,7 +98,7 @@ class UnitRows:
             raise ValueError("a point without an anchor cannot be visible")
         if self.passes is not None and len(self.passes) != count:
             raise ValueError(f"passes: expected {count}, got {len(self.passes)}")
-        for what in ("subject", "expression", "split"):
+        for what in ("subject", "expression", "split", *(["factor"] if self.factor else [])):
             check_name(what, getattr(self, what))
 
     def __len__(self) -> int:
@@ -103,13 +106,19 @@ class UnitRows:
 
     @cached_property
     def poses(self) -> list[str]:
-        """The name of each pose."""
-        return [pose_name(*angles) for angles in self.angles_deg.tolist()]
+        """The name of each pose, and of the factor of twins."""
+        return [row_name(pose_name(*angles), self.factor) for angles in self.angles_deg.tolist()]
 
     @property
     def sample_ids(self) -> list[str]:
         """The name of each row."""
         return [sample_id(self.subject, self.expression, pose) for pose in self.poses]
+
+    @property
+    def base_ids(self) -> list[str]:
+        """The name of the row of which each is the twin."""
+        poses = (pose_name(*angles) for angles in self.angles_deg.tolist())
+        return [sample_id(self.subject, self.expression, pose) for pose in poses]
 
     def of_cameras(self, value: Callable[[Camera], Any]) -> list[Any]:
         """What value says of each row's camera."""
@@ -177,4 +186,4 @@ def unit_table(rows: UnitRows, schema: pa.Schema) -> pa.Table:
     if topology_of(schema) is not rows.topology:
         raise ValueError(f"the rows have the landmarks {rows.topology.name}, the schema has others")
     mode = cast(ImageMode, image_mode(schema))
-    return pa.table([ROWS[field.name].of_rows(rows, mode) for field in schema], schema=schema)
+    return pa.table([EVERY[field.name].of_rows(rows, mode) for field in schema], schema=schema)

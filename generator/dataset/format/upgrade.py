@@ -38,9 +38,10 @@ from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer
 from generator.dataset.show.card import CARD_FILE, write_card
 from generator.errors import DatasetError
+from generator.plan.factors import PART_FOLDERS
 from generator.plan.first_settings import common_values
 
-_REWRITTEN = ("data", HEADS_FILE, ANCHORS_FILE, CARD_FILE, MANIFEST_FILE)
+_REWRITTEN = (*PART_FOLDERS, HEADS_FILE, ANCHORS_FILE, CARD_FILE, MANIFEST_FILE)
 
 
 @dataclass(frozen=True)
@@ -84,15 +85,20 @@ def upgrade_dataset(source: Path, target: Path | None = None, *, reporter: Progr
 
 
 def _write(source: Path, work: Path, manifest: Manifest, reporter: Progress) -> None:
-    reporter.stage("upgrading", len(manifest.parts))
+    reporter.stage("upgrading", len(manifest.parts) + len(manifest.twins))
     parts = []
-    for part in manifest.parts:
+    for part in (*manifest.parts, *manifest.twins):
         parts.append(_rewrite(source, work, part, manifest))
         reporter.advance()
     share_files(source, work, _REWRITTEN)
     write_heads(read_heads(source), work)
     write_anchors(list(read_anchors(source).values()), work)
-    upgraded = replace(manifest, parts=tuple(parts), schema_version=SCHEMA_VERSION)
+    upgraded = replace(
+        manifest,
+        parts=tuple(part for part in parts if not part.of_twins),
+        twins=tuple(part for part in parts if part.of_twins),
+        schema_version=SCHEMA_VERSION,
+    )
     write_card(upgraded, work)
     write_manifest(upgraded, work)
 

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.schema import sample_id
+from generator.plan.factors import row_name
+from generator.plan.twins import PlannedTwins, planned_twins
 
 
 def choose_rows(
@@ -29,6 +31,15 @@ def choose_rows(
         chosen = random.Random(f"{seed}/{names[place]}").sample(range(many), share)
         for pose in sorted(chosen):
             yield sample_id(head.subject, head.expression, poses.name(place, pose))
+
+
+def choose_twins(config: PlannedTwins, heads: Sequence[HeadRow], poses: DatasetPoses) -> Iterator[str]:
+    """The names of all twins of the plan, head by head and factor by factor."""
+    for place, head in enumerate(heads if config.dataset.twins else ()):
+        angles = [(yaw, pitch, roll) for yaw, pitch, roll in poses.plan(place).angles_deg.tolist()]
+        for factor, places in planned_twins(config, f"{head.subject}/{head.expression}", angles):
+            for pose in places:
+                yield sample_id(head.subject, head.expression, row_name(poses.name(place, pose), factor))
 
 
 def _shares(names: Sequence[str], counts: Sequence[int], wanted: int, seed: int) -> list[int]:

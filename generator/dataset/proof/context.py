@@ -67,7 +67,8 @@ def planned_views(
 class RowContext:
     """Of one batch of a part.
 
-    split: the folder the part lies in. heads, poses: the tables, where there are any yet.
+    split: the folder the part lies in. factor: the rows are twins with this one changed; "": they are none.
+    heads, poses: the tables, where there are any yet.
     anchors: float64 [heads, P, 3], at pose zero, frame C, mm; NaN where there is none.
     head_index, pose_index: int [N], the place of each row of the batch in heads and its plan, none below 0.
     measured: the largest values that checks came across, by name.
@@ -80,6 +81,7 @@ class RowContext:
     heads: Sequence[HeadRow] = ()
     poses: DatasetPoses | None = None
     split: str = ""
+    factor: str = ""
     head_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
     pose_index: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
     measured: dict[str, float] = field(default_factory=dict)

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from generator.dataset.format.anchors_table import HeadAnchors
-from generator.dataset.format.columns import ROWS
+from generator.dataset.format.columns import EVERY, ROWS
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import digest_of, row_hashes
@@ -25,10 +25,12 @@ from generator.dataset.format.parquet import open_parquet
 from generator.dataset.format.part import iter_stored, part_schema_of, reading
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer, part_schema
-from generator.dataset.proof.context import RowContext, planned_views
+from generator.dataset.proof.context import RowContext, known_config, planned_views
 from generator.dataset.proof.row_checks import row_checks
+from generator.dataset.proof.twin_checks import TWINS, TwinPlan, by_factor, twin_problems
 from generator.dataset.proof.verify_report import Check
 from generator.errors import HeadturnError
+from generator.escape import quoted
 
 
 @dataclass
@@ -38,7 +40,8 @@ class PartFindings:
     checks: by name; those without problems may be absent. digest: None where it could not be read.
     hashes: of its rows, see :func:`generator.dataset.format.digest.row_hashes`.
     heads, poses: int32 [N], the place of each known row in heads.parquet and poses.csv;
-    detected: bool [N]. measured: see :class:`generator.dataset.proof.context.RowContext`.
+    detected: bool [N]. twins: of a part of twins instead: factor, heads and poses of some.
+    measured: see :class:`generator.dataset.proof.context.RowContext`.
     """
 
     rows: int = 0
@@ -49,6 +52,7 @@ class PartFindings:
     heads: list[np.ndarray] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
     detected: list[np.ndarray] = field(default_factory=list)
+    twins: list[tuple[str, np.ndarray, np.ndarray]] = field(default_factory=list)
 
     def add(self, name: str, problems: Iterable[str]) -> None:
         """Note problems of one check."""
@@ -84,10 +88,15 @@ class PartChecker:
             expected_view=planned_views(heads, poses, manifest, root),
         )
         common = configuration_digest(parts_configuration(manifest))
-        self._schema = part_schema(manifest.images, {}, common, topology, manifest.schema_version)
+        self._schemas = {
+            twins: part_schema(manifest.images, {}, common, topology, manifest.schema_version, twins)
+            for twins in (False, True)
+        }
         named = ("schema_version", "landmark_topology", "images", "configuration_digest")
         keys = [f"headturn.{name}".encode() for name in named]
-        self._metadata = {key: self._schema.metadata[key] for key in keys}
+        self._metadata = {key: self._schemas[False].metadata[key] for key in keys}
+        twins = TwinPlan(known_config(manifest, root), heads, poses)
+        self._factors, self._twin_views = twins.factors, twins.views()
 
     def quick(self, part: PartInfo) -> PartFindings:
         """Size, footer and schema of a part, without reading its rows."""
@@ -109,7 +118,8 @@ class PartChecker:
                     f"the manifest says {part.rows} in {part.bytes}"
                 ],
             )
-        found.add("schema", (f"{part.path}: {problem}" for problem in self._schema_problems(schema)))
+        wrong = self._schema_problems(schema, part.of_twins)
+        found.add("schema", (f"{part.path}: {problem}" for problem in wrong))
         found.add("part files", _other_heads(part, footer))
         return found
 
@@ -123,7 +133,7 @@ class PartChecker:
                     "part hashes", [f"{part.path} was changed or damaged after the build (SHA-256 differs)"]
                 )
             stored = part_schema_of(path)
-            wrong = self._schema_problems(stored)
+            wrong = self._schema_problems(stored, part.of_twins)
             found.add("schema", (f"{part.path}: {problem}" for problem in wrong))
             if wrong:
                 return found
@@ -161,6 +171,9 @@ class PartChecker:
             unknown = batch.filter(pa.array(~known)).column("sample_id").to_pylist()
             found.add("every row once", (f"{name} is not in heads.parquet x poses.csv" for name in unknown))
             batch, heads, poses = batch.filter(pa.array(known)), heads[known], poses[known]
+        if part.of_twins:
+            self._check_twins(batch, heads, poses, part, found)
+            return
         if not len(batch):
             return
         found.heads.append(heads)
@@ -176,7 +189,30 @@ class PartChecker:
         for name, check in self._checks.items():
             found.add(name, check(batch, context))
 
-    def _schema_problems(self, schema: pa.Schema) -> list[str]:
+    def _check_twins(
+        self, batch: pa.RecordBatch, heads: np.ndarray, poses: np.ndarray, part: PartInfo, found: PartFindings
+    ) -> None:
+        """The same of twins, factor by factor, and each against the row of which it is the twin."""
+        for factor, of_it in by_factor(batch):
+            if factor not in self._factors:
+                found.add(TWINS, [f"{part.path}: the configuration names no factor {quoted(factor)}"])
+                continue
+            some, of_head, of_pose = batch.filter(pa.array(of_it)), heads[of_it], poses[of_it]
+            found.twins.append((factor, of_head, of_pose))
+            context = replace(
+                self._context,
+                expected_view=self._twin_views(factor),
+                split=part.path.split("/")[1],
+                factor=factor,
+                head_index=of_head,
+                pose_index=of_pose,
+                measured=found.measured,
+            )
+            for name, check in self._checks.items():
+                found.add(name, check(some, context))
+            found.add(TWINS, twin_problems(some, factor, self._root, self._manifest))
+
+    def _schema_problems(self, schema: pa.Schema, twins: bool) -> list[str]:
         metadata = schema.metadata or {}
         wrong = [
             f"{key.decode()} is {metadata.get(key, b'missing').decode(errors='replace')!r}, "
@@ -184,11 +220,12 @@ class PartChecker:
             for key, value in self._metadata.items()
             if metadata.get(key) != value
         ]
+        expected = self._schemas[twins]
         if is_newer(self._manifest.schema_version):  # it may have columns that we do not know
-            schema = pa.schema([field for field in schema if field.name in ROWS])
-        if not schema.equals(self._schema):
-            names = set(schema.names) ^ set(self._schema.names) or {
-                field.name for field in self._schema if not schema.field(field.name).equals(field)
+            schema = pa.schema([field for field in schema if field.name in (EVERY if twins else ROWS)])
+        if not schema.equals(expected):
+            names = set(schema.names) ^ set(expected.names) or {
+                field.name for field in expected if not schema.field(field.name).equals(field)
             }
             what = ", ".join(sorted(names)) or "their order"
             wrong.append(f"columns differ from schema {self._manifest.schema_version}: {what}")

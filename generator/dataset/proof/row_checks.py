@@ -22,6 +22,7 @@ from generator.dataset.proof.named import named
 from generator.dataset.proof.pass_checks import pass_problems
 from generator.errors import DatasetError
 from generator.geometry.rotation import quaternion_from_rotation, rotation_from_angles
+from generator.plan.factors import part_folder, row_name
 from generator.plan.poses import ANGLES
 
 TOLERANCE, CAMERA_TOLERANCE = 1e-12, 1e-9
@@ -34,17 +35,19 @@ def identity_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
     assert context.poses is not None
     facts = (batch.column(n).to_pylist() for n in ("sample_id", "split", "head_license", "redistributable"))
     indices = np.stack([as_array(batch, f"{angle}_index") for angle in ANGLES], axis=-1)
+    folder = part_folder(context.factor)
     off = (indices != context.poses.indices(context.head_index, context.pose_index)).any(axis=1)
     places = (context.head_index.tolist(), context.pose_index.tolist())
     for name, row_split, license_, redistributable, i, k, off_grid in zip(
         *facts, *places, off.tolist(), strict=True
     ):
         head = context.heads[i]
-        expected = sample_id(head.subject, head.expression, context.poses.name(i, k))
+        pose = row_name(context.poses.name(i, k), context.factor)
+        expected = sample_id(head.subject, head.expression, pose)
         if name != expected:
             yield f"{name} should be called {expected}"
         if row_split != context.split or head.split != context.split:
-            yield f"{name}: split {row_split!r} in data/{context.split}, {head.split!r} in heads.parquet"
+            yield f"{name}: split {row_split!r} in {folder}/{context.split}, {head.split!r} in heads.parquet"
         if license_ != head.license or redistributable != head.redistributable:
             yield f"{name}: licence differs from heads.parquet ({license_!r}, {head.license!r})"
         if off_grid:

@@ -25,12 +25,16 @@ from generator.dataset.format.merkle import merkle_root
 from generator.dataset.format.open import dataset_topology
 from generator.dataset.format.part_info import PartInfo
 from generator.dataset.format.schema import is_newer
+from generator.dataset.proof.context import known_config
 from generator.dataset.proof.exact_checks import anchor_problems, levelling_problems
 from generator.dataset.proof.part_checks import PartChecker, PartFindings
 from generator.dataset.proof.row_checks import row_checks
+from generator.dataset.proof.twin_checks import TWINS
+from generator.dataset.proof.twins_seen import TwinsSeen, has_twins
 from generator.dataset.proof.verify_report import Check, VerifyReport
 from generator.dataset.show.detection import DetectionTally
 from generator.errors import DatasetError, HeadturnError, WorkerError
+from generator.plan.factors import PART_FOLDERS
 from generator.pool import processes
 from generator.process import available_cores
 
@@ -38,9 +42,10 @@ _FIRST = ("manifest", "heads and poses", "part files", "part hashes", "schema", 
 _QUICK = ("manifest", "heads and poses", "part files", "part sizes", "schema", "rows", "anchors")
 
 
-def check_names(quick: bool = False, schema_version: str = SCHEMA_VERSION) -> list[str]:
+def check_names(quick: bool = False, schema_version: str = SCHEMA_VERSION, twins: bool = False) -> list[str]:
     """What is checked of a dataset of this schema version, in the order of the report."""
     names = list(_QUICK) if quick else [*_FIRST, *row_checks(schema_version), "digest"]
+    names += [TWINS] * twins
     if is_newer(ANCHORS_SINCE, schema_version):
         return [name for name in names if name != "anchors"]
     if not quick:
@@ -92,7 +97,8 @@ def verify_dataset(
         checks["manifest"].add([str(error)])
         return VerifyReport(tuple(checks.values()), quick=quick)
     # An older dataset has fewer columns, and fewer things to be wrong about.
-    checks = {name: Check(name) for name in [*check_names(quick, manifest.schema_version), *asked]}
+    names = check_names(quick, manifest.schema_version, has_twins(manifest))
+    checks = {name: Check(name) for name in [*names, *asked]}
     report = VerifyReport(tuple(checks.values()), quick=quick)
     checks["manifest"].done = True
     try:
@@ -104,6 +110,7 @@ def verify_dataset(
             name for name in tables if file_sha256(dataset_file(root, name)) != manifest.tables.get(name)
         ]
         checker = PartChecker(root, manifest, heads, poses, anchors)
+        config = known_config(manifest, root)
     except (OSError, HeadturnError) as error:
         checks["heads and poses"].add([str(error)])
         return report
@@ -117,13 +124,15 @@ def verify_dataset(
     for check in checks.values():
         check.done = True
     parts = _present_parts(root, manifest, checks["part files"])
-    tally = DetectionTally(heads, poses)
+    tally, twins = DetectionTally(heads, poses), TwinsSeen(config, heads, poses)
     rows, closure_deg, digests, hashes = 0, 0.0, list[str](), list[bytes]()
     with _findings(root, checker, manifest, parts, quick, workers) as findings:
-        for done, found in enumerate(findings, start=1):
+        for done, (part, found) in enumerate(zip(parts, findings, strict=True), start=1):
             for name, problems in found.checks.items():
                 checks[name].merge(problems)
-            if found.digest is not None:
+            if part.of_twins:
+                twins.add(found)
+            elif found.digest is not None:
                 rows += found.rows
                 digests.append(found.digest)
                 hashes.append(found.hashes)
@@ -131,11 +140,14 @@ def verify_dataset(
             for places in zip(found.heads, found.poses, found.detected, strict=True):
                 tally.add(*places)
             if progress:
-                progress(done, len(manifest.parts))
+                progress(done, len(parts))
     if len(heads) != manifest.heads:
         checks["heads and poses"].add(
             [f"heads.parquet has {len(heads)} heads, the manifest says {manifest.heads}"]
         )
+    if TWINS in checks:
+        checks[TWINS].add(twins.problems(manifest, quick))
+        report = replace(report, twins=twins.proved(quick))
     whole = replace(report, heads=len(heads), poses=poses.most, rows=rows)
     if quick:
         if rows != poses.rows:
@@ -184,11 +196,13 @@ def _changed_files(root: Path, manifest: Manifest) -> Iterator[str]:
 
 def _present_parts(root: Path, manifest: Manifest, check: Check) -> list[PartInfo]:
     """The listed parts that exist; missing and unlisted files become problems."""
-    expected = {part.path for part in manifest.parts}
-    found = {p.relative_to(root).as_posix() for p in (root / "data").rglob("*") if not p.is_dir()}
+    listed = (*manifest.parts, *manifest.twins)
+    expected = {part.path for part in listed}
+    there = (p for folder in PART_FOLDERS for p in (root / folder).rglob("*") if not p.is_dir())
+    found = {p.relative_to(root).as_posix() for p in there}
     check.add(f"{path} is missing" for path in sorted(expected - found))
     check.add(f"{path} is not listed in the manifest" for path in sorted(found - expected))
-    return [part for part in manifest.parts if part.path in found]
+    return [part for part in listed if part.path in found]
 
 
 def _check_every_row_once(tally: DetectionTally, manifest: Manifest, check: Check) -> None:

@@ -100,6 +100,21 @@ class Deep:
 
 
 @dataclass(frozen=True)
+class Twins:
+    """The twins of a dataset. digest, merkle_root: of those that were read; "" where none were."""
+
+    rows: int
+    factors: tuple[str, ...]
+    digest: str = ""
+    merkle_root: str = ""
+
+    def line(self) -> str:
+        """For people."""
+        said = f"{self.rows} twins of rows, with {', '.join(self.factors) or 'nothing'} changed"
+        return said + f"; digest {self.digest}, Merkle root {self.merkle_root}" * bool(self.merkle_root)
+
+
+@dataclass(frozen=True)
 class VerifyReport:
     """What was checked and what was counted. Rates are shares of 1; NaN without rows.
 
@@ -107,6 +122,7 @@ class VerifyReport:
     quick: contents were not read; then closure_deg, rate_by_subject, cells and merkle_root are empty.
     digest, merkle_root: of the rows that were read; the manifest's digest if quick; "" if there is none.
     expected: the digest or root that they must have, if the user named one.
+    twins: those that there are, where there are any.
     deep: what was done about images, if it was asked for and everything else holds.
     """
 
@@ -124,6 +140,7 @@ class VerifyReport:
     merkle_root: str = ""
     expected: str | None = None
     deep: Deep | None = None
+    twins: Twins | None = None
 
     @property
     def ok(self) -> bool:
@@ -150,6 +167,8 @@ class VerifyReport:
                 f"{self.rows} rows of {self.heads} heads x {self.poses} poses; "
                 f"a face was found in {self.detection_rate:.1%}"
             )
+        if self.twins is not None:
+            lines.append(self.twins.line())
         if self.quick:
             lines.append("quick: sizes and footers only; without --quick every byte is read")
         elif self.rows:
@@ -193,6 +212,7 @@ class VerifyReport:
             "merkle_root": self.merkle_root,
             "checks": [{"name": c.name, "ok": c.ok, "detail": c.detail} for c in self.checks],
             "deep": asdict(self.deep) if self.deep else None,
+            **({"twins": asdict(self.twins)} if self.twins else {}),
             "heads": self.heads,
             "poses": self.poses,
             "rows": self.rows,

@@ -19,6 +19,7 @@ from generator.dataset.show.column_tables import column_rows, markdown_table
 from generator.dataset.show.factors import factors_of
 from generator.escape import markdown, markdown_code
 from generator.landmarks.topology import FACE_MESH, Topology
+from generator.plan.factors import FACTORS
 
 CARD_FILE = "README.md"
 
@@ -81,6 +82,7 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topolog
         "## Columns of data/\n\n" + markdown_table(("column", "type", "meaning"), columns),
         other_tables,
         *variety_text(manifest.configuration),
+        *twins_text(manifest),
         "## Conventions\n\n" + markdown_table(("what", "definition"), tuple(conventions(topology).items())),
     ]
     return "\n\n".join(sections) + "\n"
@@ -108,6 +110,22 @@ def variety_text(configuration: Mapping[str, Any]) -> list[str]:
     return [f"## What varies\n\n{table}\n\n{told}"]
 
 
+def twins_text(manifest: Manifest) -> list[str]:
+    """What a dataset's twins are and how they are read, if it has any."""
+    if not manifest.twins:
+        return []
+    asked = manifest.configuration.get("dataset", {}).get("twins", ())
+    rows = [(factor.name, factor.meaning) for factor in FACTORS.values() if factor.name in asked]
+    count, found = (sum(getattr(part, name) for part in manifest.twins) for name in ("rows", "detected"))
+    told = (
+        f"{count} images besides the rows, faces found in {found / count:.1%} of them: each is the twin of "
+        "a row, the same head and pose with one factor changed. They lie in `twins/`, with the columns of "
+        "`data/` and `twin_of` (the row's `sample_id`) and `factor`; `data/` has none of them. "
+        '`load_dataset("DIR", "twins")` reads them, `headturn ablate` compares them with their rows.'
+    )
+    return ["## Twins\n\n" + told + "\n\n" + markdown_table(("factor", "what changes"), rows)]
+
+
 def _front_matter(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
     licenses = {head.license for head in heads}
     lines = [
@@ -121,7 +139,15 @@ def _front_matter(manifest: Manifest, heads: Sequence[HeadRow]) -> str:
     ]
     for split in manifest.splits:
         lines += [f"  - split: {json.dumps(split)}", f"    path: {json.dumps(f'data/{split}/*.parquet')}"]
-    lines += ["- config_name: heads", f"  data_files: {HEADS_FILE}", "---"]
+    lines += ["- config_name: heads", f"  data_files: {HEADS_FILE}"]
+    if manifest.twins:
+        lines += ["- config_name: twins", "  data_files:"]
+        for split in sorted({part.path.split("/")[1] for part in manifest.twins}):
+            lines += [
+                f"  - split: {json.dumps(split)}",
+                f"    path: {json.dumps(f'twins/{split}/*.parquet')}",
+            ]
+    lines.append("---")
     return "\n".join(lines)
 
 

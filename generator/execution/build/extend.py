@@ -19,6 +19,7 @@ from generator.dataset.format.schema import schema_version_of
 from generator.errors import DatasetError
 from generator.execution.build.receipts import Receipts
 from generator.messages import BuildOrder
+from generator.plan.factors import PART_FOLDERS, part_folder
 from generator.plan.poses import ANGLES
 
 
@@ -47,7 +48,8 @@ def earlier_parts(orders: Sequence[BuildOrder]) -> set[str]:
 
 def check_schema_of_parts(root: Path) -> None:
     """Raises DatasetError if the parts that are there are of another schema: two make no dataset."""
-    for path in sorted((root / "data").rglob("part-*.parquet")):
+    parts = [sorted((root / folder).rglob("part-*.parquet")) for folder in PART_FOLDERS]
+    for path in [file for files in parts for file in files]:
         try:
             schema = part_schema_of(path)
         except DatasetError:
@@ -71,7 +73,7 @@ def _renamed(order: BuildOrder, part: PartInfo, root: Path) -> PartInfo:
     for axis, angle in enumerate(ANGLES):
         at = table.schema.get_field_index(f"{angle}_index")
         table = table.set_column(at, table.schema.field(at), pa.array(indices[:, axis]))
-    return write_part(table, root, order.split, order.unit)
+    return write_part(table, root, order.split, order.unit, part_folder(order.factor))
 
 
 def _link(path: Path, target: Path) -> None:

@@ -20,11 +20,13 @@ from generator.dataset.show.card import CARD_FILE
 from generator.errors import DatasetError
 from generator.execution.build.lock import LOCK_FILE
 from generator.execution.build.receipts import Receipts
+from generator.execution.build.unit_check import row_names
 from generator.execution.status import LOG_FILE
 from generator.heads.head import SkippedHead
 from generator.messages import BuildOrder
 from generator.names import is_text
 from generator.plan.config import BuildConfig, config_toml, differences, read_recorded
+from generator.plan.factors import PART_FOLDERS
 from generator.plan.pose_plans import POSES_FILE, HeadName, PosePlans, is_drawn, poses_csv
 from generator.plan.poses import pose_name
 from generator.plan.settings import all_settings
@@ -35,7 +37,7 @@ SHEET_FILE, ANCHOR_SHEET_FILE, MAP_FILE = "contact_sheet.png", "anchors.png", "d
 WRITTEN = (
     CONFIG_FILE, POSES_FILE, FAILURES_FILE, MANIFEST_FILE, HEADS_FILE, ANCHORS_FILE, CARD_FILE, SHEET_FILE,
     ANCHOR_SHEET_FILE, MAP_FILE, LOG_FILE, RECEIPTS_FILE, PLACED_FILE,
-    FIRST_PLACED_FILE, MADE_HEADS, "data", "images", "exr",
+    FIRST_PLACED_FILE, MADE_HEADS, *PART_FOLDERS, "images", "exr",
 )  # fmt: skip
 """Everything a build writes into a dataset's folder."""
 
@@ -137,7 +139,8 @@ def stale_parts(root: Path, orders: Iterable[BuildOrder]) -> list[str]:
     """Parts that no order accounts for, relative to root. Removes what a killed build left half-written."""
     planned = {order.part_path for order in orders}
     stale = []
-    for path in sorted((root / "data").rglob("*")):
+    there = (path for folder in PART_FOLDERS for path in sorted((root / folder).rglob("*")))
+    for path in there:
         if path.name.startswith(".") and path.suffix == ".tmp":
             path.unlink()
         elif path.suffix == ".parquet" and path.relative_to(root).as_posix() not in planned:
@@ -165,8 +168,23 @@ def ask_to_drop(stale: Sequence[str], root: Path, confirm: Confirm) -> None:
         )
 
 
-def drop(stale: Iterable[str], root: Path, heads: Iterable[HeadName], plans: PosePlans) -> None:
-    """Remove parts, and the files they name that no pose of a planned head needs."""
+def drop(
+    stale: Iterable[str],
+    root: Path,
+    heads: Iterable[HeadName],
+    plans: PosePlans,
+    orders: Iterable[BuildOrder],
+) -> None:
+    """Remove parts, and the files they name that neither a pose of a planned head nor a twin needs.
+
+    orders: of the plan; they know the twins.
+    """
+    twins = {
+        (order.head.subject, order.head.expression, name)
+        for order in orders
+        if order.factor
+        for name in row_names(order)
+    }
     kept: dict[HeadName, set[str]] = {}
     names: dict[int, set[str]] = {}  # of a plan, which many heads may share
     for head in heads:
@@ -177,7 +195,8 @@ def drop(stale: Iterable[str], root: Path, heads: Iterable[HeadName], plans: Pos
     for path in stale:
         for file in _files_of(root, path):
             _, subject, expression, name = file.parts
-            if name.removesuffix(file.suffix) not in kept.get((subject, expression), ()):
+            row = name.removesuffix(file.suffix)
+            if row not in kept.get((subject, expression), ()) and (subject, expression, row) not in twins:
                 dataset_file(root, file.as_posix()).unlink(missing_ok=True)
         (root / path).unlink()
 

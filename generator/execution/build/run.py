@@ -61,6 +61,7 @@ from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, differences, recorded_config
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE, plan_poses, read_pose_plans, shared_plan
+from generator.plan.twins import twin_factors
 from generator.worn.things import check_things
 
 
@@ -108,7 +109,9 @@ def build(
         cannot be written, or confirm said no.
     """
     root = root.absolute()
-    shared_plan(config)  # what makes no sense is said before a folder is made
+    # What makes no sense is said before a folder is made.
+    shared_plan(config)
+    twin_factors(config)
     config = settled(config)
     check_things(config)
     claim(root)
@@ -165,7 +168,7 @@ def _build(
     if carried := carry_over(orders, root, receipts):
         reporter.note(f"{carried} parts were taken over without being rendered again")
     begin(config, root)
-    drop(stale, root, heads, poses.plans)
+    drop(stale, root, heads, poses.plans, orders)
     write_poses(poses.plans, root)
     done, todo = split_done(orders, receipts)
     for reason in receipts.refused.values():
@@ -174,7 +177,8 @@ def _build(
         reporter.note(f"continuing: {len(done)} of {len(orders)} units are already there")
 
     reporter.stage("rendering", sum(len(order.views) for order in todo))
-    parts, failures, seconds = run_units(todo, executor, receipts, reporter, lock.check)
+    built, failures, seconds = run_units(todo, executor, receipts, reporter, lock.check)
+    parts = sorted(done + built, key=lambda part: part.path)
     write_lines(root / FAILURES_FILE, failures)
     recorded = config.moved_to(root)
     topology = registries.DETECTORS.get(config.landmarks.detector).topology
@@ -185,7 +189,8 @@ def _build(
     manifest = Manifest(
         versions=versions,
         configuration=recorded.as_dict(),
-        parts=tuple(sorted(done + parts, key=lambda part: part.path)),
+        parts=tuple(part for part in parts if not part.of_twins),
+        twins=tuple(part for part in parts if part.of_twins),
         images=cast(ImageMode, config.dataset.images),
         heads=len(planned),
         skipped=tuple({"head": f"{s.subject}/{s.expression}", "reason": s.reason} for s in skipped),
@@ -227,6 +232,7 @@ def run_units(
             "subject": order.head.subject,
             "expression": order.head.expression,
             "poses": len(order.views),
+            **({"factor": order.factor} if order.factor else {}),
             "attempts": outcome.attempts,
         }
         if outcome.receipt is None:

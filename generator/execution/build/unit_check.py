@@ -19,6 +19,7 @@ from generator.dataset.proof.context import RowContext
 from generator.dataset.proof.row_checks import row_checks
 from generator.errors import DatasetError
 from generator.messages import BuildOrder
+from generator.plan.factors import row_name
 from generator.plan.poses import pose_name
 
 _VERSIONS = b"headturn.versions"
@@ -28,10 +29,15 @@ _OF_TABLES = "identity"
 """The check that compares rows with heads.parquet and poses.csv, which an unfinished build has not."""
 
 
+def row_names(order: BuildOrder) -> list[str]:
+    """The last part of the sample_id of each row of a unit."""
+    return [row_name(pose_name(*view.pose), order.factor) for view in order.views]
+
+
 def unit_files(order: BuildOrder) -> list[str]:
     """Files that a unit's part vouches for, relative to the dataset: its images and its passes."""
     names = (order.head.subject, order.head.expression)
-    poses = [pose_name(*view.pose) for view in order.views]
+    poses = row_names(order)
     files = []
     if order.images == "files":
         files += [image_path(*names, pose, f".{order.image_format}") for pose in poses]
@@ -63,7 +69,8 @@ def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
         yield "says nothing about its dataset"
         return
     topology = registries.DETECTORS.get(order.landmarks.detector).topology
-    expected_schema = part_schema(cast(ImageMode, order.images), {}, order.configuration_digest, topology)
+    images, twins = cast(ImageMode, order.images), bool(order.factor)
+    expected_schema = part_schema(images, {}, order.configuration_digest, topology, twins=twins)
     if not stored.equals(expected_schema):
         yield "has other columns than a part of this dataset"
         return
@@ -73,8 +80,8 @@ def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
         return
     head = order.head
     rows = iter(
-        (sample_id(head.subject, head.expression, pose_name(*view.pose)), order.split, head.license)
-        for view in order.views
+        (sample_id(head.subject, head.expression, name), order.split, head.license)
+        for name in row_names(order)
     )
     checks = {name: check for name, check in row_checks().items() if name != _OF_TABLES}
     start = 0

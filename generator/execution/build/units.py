@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from generator.messages import BuildOrder
 from generator.picture.scenery import folders_of
 from generator.plan.config import BuildConfig
 from generator.plan.settings import ROWS, beyond_defaults
+from generator.plan.twins import plan_twins, planned_twins
 from generator.plan.view_plan import framed_camera, plan_views
 from generator.plan.views import Views
 
@@ -108,15 +109,42 @@ def plan_units(
             order = build_order(
                 head, planned.placement, points, planned.split, views, chunk.indices, config, root
             )
-            orders.append(
-                replace(
-                    order,
-                    unit=name(chunk.indices),
-                    configuration_digest=configuration_digest,
-                    earlier_units=tuple(before),
-                )
+            order = replace(
+                order,
+                unit=name(chunk.indices),
+                configuration_digest=configuration_digest,
+                earlier_units=tuple(before),
             )
+            orders.append(order)
+            if config.dataset.twins:
+                orders += _twin_orders(order, planned, chunk, config, fixed)
     return orders
+
+
+def _twin_orders(
+    order: BuildOrder, planned: PlannedHead, chunk: Chunk, config: BuildConfig, fixed: str
+) -> Iterator[BuildOrder]:
+    """The orders of a unit's twins, one a factor: so a factor more is units more, and changes none."""
+    head, radius = order.head.name, planned.placement.radius_mm
+    for factor, places in planned_twins(config, head, chunk.poses):
+        poses = tuple(chunk.poses[k] for k in places)
+        views = plan_twins(config, head, radius, poses, factor)
+        seen = [to_plain(views.cameras), to_plain(views.looks), list(views.seeds)]
+        now, before = (
+            tuple(indices[k] for k in places) if indices else None
+            for indices in (chunk.indices, chunk.earlier_indices)
+        )
+        unit, *earlier = (
+            _digest([fixed, seen, poses, indices, factor])[:16] for indices in (now, before) if indices
+        )
+        yield replace(
+            order,
+            unit=unit,
+            earlier_units=tuple(earlier),
+            views=views,
+            indices=now or (),
+            factor=factor,
+        )
 
 
 def build_order(

@@ -26,7 +26,7 @@ from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
 from generator.errors import HeadError, WorkerError
-from generator.execution.lanes.labels import asks_labels, labelled_head
+from generator.execution.lanes.labels import labelled_head
 from generator.execution.lanes.options import LaneOptions, OnImage
 from generator.execution.lanes.renderer import Renderer
 from generator.execution.lanes.shots import Shots
@@ -89,7 +89,7 @@ class Lane:
             self._places = self._open_renderer("looks", options, None)
         self._wardrobe = Wardrobe(self._scratch / "worn")
         self._detectors: dict[Landmarks, Detector] = {}
-        self._loaded: tuple[Head, Placement, tuple[bool, bool]] | None = None
+        self._loaded: tuple[Head, Placement, bool, bool] | None = None
 
     def run(self, order: LaneOrder, on_image: OnImage) -> Receipt:
         """See :class:`generator.execution.lanes.options.AnyLane`."""
@@ -249,11 +249,16 @@ class Lane:
             image_suffix=suffix,
             passes=passes,
             topology=topology,
+            factor=order.factor,
         )
         versions = self._versions(order.landmarks)
         with _timed(seconds, "write"):
             schema = part_schema(
-                cast(ImageMode, order.images), versions, order.configuration_digest, topology
+                cast(ImageMode, order.images),
+                versions,
+                order.configuration_digest,
+                topology,
+                twins=bool(order.factor),
             )
             part = commit_unit(rows, schema, Path(order.root), order.unit)
         return Built(part, seconds, versions)
@@ -276,21 +281,18 @@ class Lane:
         """The head of an order for its render worker; made once as long as it is the same."""
         package = self._scratch / "head.npz"
         head, placement = order.head, order.placement
-        by_texel = SEGMENTATION.name in order.passes
-        tells = (by_texel, by_texel or asks_labels(order.views))
-        known = (head, placement, tells) == self._loaded
-        if not known:
+        tells, shaded = SEGMENTATION.name in order.passes, shades(order.views)
+        wanted = head, placement, tells, shaded
+        if wanted != self._loaded:
             self._loaded = None
-            self._mesh = placement.normalise(head_alone(self.read(head), placement))
-            self._surface = Surface(self._mesh)
-        if shades(order.views) and self._mesh.openness is None:
-            self._mesh, known = with_occlusion(self._mesh, self._surface), False
-        if not known:
-            mesh = self._mesh
-            if any(tells):
-                mesh = labelled_head(head, mesh, order.anchors, self._scratch if by_texel else None)
+            mesh = placement.normalise(head_alone(self.read(head), placement))
+            self._mesh, self._surface = mesh, Surface(mesh)
+            if shaded:
+                mesh = with_occlusion(mesh, self._surface)
+            if tells:
+                mesh = labelled_head(head, mesh, order.anchors, self._scratch)
             save_package(mesh, package)
-            self._loaded = head, placement, tells
+            self._loaded = wanted
         return package
 
 

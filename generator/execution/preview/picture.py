@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 
 from generator.errors import DatasetError, HeadError, UsageError
-from generator.execution.lanes.labels import asks_labels, labelled_head
 from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions
 from generator.execution.lanes.scratch import scratch_folder
@@ -92,9 +91,6 @@ def render_preview(
             placed = placement.normalise(head_alone(mesh, placement))
             if shades(views):
                 placed = with_occlusion(placed)
-            if asks_labels(views):
-                points = lane.points(mesh, placement, config.landmarks)
-                placed = labelled_head(head, placed, points, None)
             save_package(placed, package)
             folders = folders_of(config)
             outfits = lane.dressed(head, mesh, placement, views, config.landmarks, folders.things)
@@ -110,7 +106,7 @@ def render_preview(
     except OSError as error:
         raise DatasetError(f"{picture}: cannot be written ({error.strerror})") from error
     left_out = (f"skipped {skip.subject}/{skip.expression}: {skip.reason}" for skip in source.skipped)
-    notes = (*head.problems, *mesh.problems, *placement.notes, *outfits.left_out, *left_out)
+    notes = filter(None, (*head.problems, *mesh.problems, *placement.notes, *outfits.left_out, *left_out))
     return Preview(found is not None, tuple(dict.fromkeys(notes)), drawn_values(config, head.name, pose))
 
 

@@ -17,7 +17,7 @@ that fails is answered with ``{"error": "one line"}``. It ends when stdin closes
 ``{"op": "looks", "config", "package", "head", "radius_mm", "pose", "seeds": [...], "folder",
 "sheet": columns}``
     the looks that builds with these seeds draw for one pose: ``{"pictures", "drawn": [{key: value}, ...]}``,
-    and ``"sheet"``, with each one's seed
+    ``"left_out"``, what each could not wear and why, and ``"sheet"``, with each one's seed
 ``{"op": "thumbnail", "config", "subject", "expression", "pixels", "cache": FOLDER}``
     a small picture of a head at pose zero, made once for the same files: ``{"picture": path}``
 ``{"op": "plan", "config", "subject", "expression", "file": FILE.npy}``
@@ -63,6 +63,7 @@ from generator.plan.settings import Values
 from generator.plan.view_plan import drawn_values, plan_views
 from generator.plan.views import Pose, Views
 from generator.plan.wear import Worn
+from generator.worn.wardrobe import Outfits
 
 
 class _Quiet:
@@ -140,7 +141,8 @@ class PreviewServer:
         config = settled(config)
         views = plan_views(config, head, radius_mm, [(y, p, r) for y, p, r in poses])
         found, tiles = [], []
-        images = [*self._render(Path(package), views, config, self._worn(config, head, views))]
+        worn = self._outfits(config, head, views).worn
+        images = [*self._render(Path(package), views, config, worn)]
         for image in images:
             detector = self._open_lane().detector(config.landmarks) if landmarks else None
             points = detector.detect(image) if detector else None
@@ -163,10 +165,12 @@ class PreviewServer:
         seeded = [replace(config, poses=replace(config.poses, seed=seed)) for seed in seeds]
         planned = [plan_views(one, head, radius_mm, [(yaw, pitch, roll)])[0] for one in seeded]
         views = Views.of(planned)
-        images = [*self._render(Path(package), views, config, self._worn(config, head, views))]
+        outfits = self._outfits(config, head, views)
+        images = [*self._render(Path(package), views, config, outfits.worn)]
         tiles = [_named(image, str(seed)) for image, seed in zip(images, seeds, strict=True)]
         drawn = [drawn_values(one, head, (yaw, pitch, roll)) for one in seeded]
-        return {**_written(images, Path(folder), tiles, sheet), "drawn": drawn}
+        left_out = [*outfits.left_out] or [""] * len(seeds)
+        return {**_written(images, Path(folder), tiles, sheet), "drawn": drawn, "left_out": left_out}
 
     def _thumbnail(
         self, config: BuildConfig, subject: str, expression: str, pixels: int, cache: str
@@ -225,14 +229,14 @@ class PreviewServer:
         save_package(finish(placement.normalise(head_alone(mesh, placement))), target)
         return mesh.problems, len(mesh.vertices)
 
-    def _worn(self, config: BuildConfig, name: str, views: Views) -> tuple[tuple[Worn, ...], ...]:
+    def _outfits(self, config: BuildConfig, name: str, views: Views) -> Outfits:
         """What a head wears in some views."""
         if not any(look.wears for look in views.looks):
-            return ()
+            return Outfits()
         head = self._head(*name.split("/"))
         placement, lane = self._placement(config, head.subject), self._open_lane()
         things = folders_of(config).things
-        return lane.dressed(head, lane.read(head), placement, views, config.landmarks, things).worn
+        return lane.dressed(head, lane.read(head), placement, views, config.landmarks, things)
 
     def _render(
         self, package: Path, views: Views, config: BuildConfig, worn: tuple[tuple[Worn, ...], ...] = ()

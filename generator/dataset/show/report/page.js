@@ -350,6 +350,78 @@
     return bars;
   }
 
+  // ---- twins -----------------------------------------------------------
+  const EFFECTS = ["found", "landmarks", "geodesic", "yaw", "pitch", "roll"];
+  const EFFECT_NAMES = { found: "faces found", landmarks: "landmarks off", geodesic: "pose off",
+    yaw: "yaw off", pitch: "pitch off", roll: "roll off" };
+  function setUpTwins() {
+    const twins = data.twins;
+    if (!twins) {
+      $("twins").remove();
+      document.querySelector('nav a[href="#twins"]').remove();
+      return;
+    }
+    $("twins-note").textContent = "Two images of the same head at the same pose, one without and one with the factor; " +
+      "nothing else differs. Faces found: of all pairs. Landmarks (as a share of the distance between the outer eye " +
+      "corners) and pose (the rigid fit of the reference face, against the exact rotation): of pairs in which both " +
+      `faces were found. Intervals hold ${percent(twins.level, 0)} of ${whole(twins.resamples)} resamplings of the ` +
+      "identities; where one leaves out zero, it is drawn in colour.";
+    const reach = {};  // of each measure, over all factors: so bars may be compared
+    for (const name of EFFECTS) {
+      const ends = twins.factors.flatMap((one) => one.judged[0].effects.filter((e) => e.measure === name)
+        .flatMap((e) => [e.change, e.low, e.high])).filter((value) => value !== null).map(Math.abs);
+      reach[name] = Math.max(...ends, 1e-9);
+    }
+    $("effects").append(...twins.factors.map((one) => drawEffects(one, reach)));
+  }
+  function drawEffects(one, reach) {
+    const detector = one.judged[0];
+    const missed = detector.found_neither + detector.found_plain + detector.found_with;
+    const said = [`${whole(one.pairs)} ${one.pairs === 1 ? "pair" : "pairs"} of ${whole(one.identities)} ` +
+      (one.identities === 1 ? "identity" : "identities")];
+    if (missed) said.push(`a face was missed in ${whole(missed)}: ${whole(detector.found_plain)} with it alone, ` +
+      `${whole(detector.found_with)} without it alone, ${whole(detector.found_neither)} in both`);
+    if (one.not_made) said.push(`${whole(one.not_made)} left out, since it could not be made for the head`);
+    const card = make("article", { class: "card effect", "data-effect": one.factor },
+      make("h3", { text: one.factor }), make("p", { class: "note", text: `${one.meaning[0].toUpperCase()}${one.meaning.slice(1)}. ${said.join("; ")}.` }));
+    const tiles = make("div", { class: "twins" });
+    for (const pair of one.examples) {
+      const box = make("div", { class: "twin" });
+      for (const [side, under] of [["plain", "without"], ["with", "with"]]) {
+        const tile = make("figure", { class: "tile", title: pair[side].name },
+          make("img", { src: pair[side].src, alt: pair[side].name }));
+        tile.append(make("figcaption", { class: pair[side].found ? "" : "missed", text: under + (pair[side].found ? "" : ", missed") }));
+        box.append(tile);
+      }
+      tiles.append(box);
+    }
+    const table = make("table", { class: "plain" });
+    table.append(make("tr", {}, ...["", "without", "with", "change", ""].map((text) => make("th", { scope: "col", text }))));
+    for (const name of EFFECTS) {
+      const found = detector.effects.find((effect) => effect.measure === name);
+      if (!found || found.change === null) continue;
+      const interval = found.low === null ? "" : ` [${signed(found.low)}, ${signed(found.high)}]`;
+      table.append(make("tr", { "data-measure": name, "data-change": found.change },
+        make("th", { scope: "row", text: `${EFFECT_NAMES[name]}, ${found.unit}` }),
+        make("td", { class: "number", text: found.plain.toFixed(2) }), make("td", { class: "number", text: found.with.toFixed(2) }),
+        make("td", { class: "number", text: signed(found.change) + interval }),
+        make("td", {}, range(found, reach[name]))));
+    }
+    card.append(tiles, table);
+    return card;
+  }
+  const signed = (value) => (value > 0 ? "+" : "") + minus(value.toFixed(2));
+  function range(found, reach) {
+    const at = (value) => 50 + (50 * value) / reach;
+    const sure = found.low !== null && (found.low > 0 || found.high < 0);
+    const box = make("div", { class: sure ? "range sure" : "range" });
+    if (found.low !== null) {
+      box.append(make("i", { style: `left:${at(found.low)}%;width:${Math.max(at(found.high) - at(found.low), 1)}%` }));
+    }
+    box.append(make("b", { style: `left:${at(found.change)}%` }));
+    return box;
+  }
+
   // ---- the rest --------------------------------------------------------
   function setUpHeads() {
     const hidden = data.heads_count - data.publishable;
@@ -409,6 +481,7 @@
   setUpMaps();
   if (!data.why_no_atlas) setUpFace();
   setUpVariety();
+  setUpTwins();
   setUpHeads();
   setUpBuild();
   document.documentElement.dataset.ready = "yes";

@@ -17,6 +17,7 @@ from generator.dataset.show.report.atlas import collect_atlas
 from generator.dataset.show.report.cells import PoseCells
 from generator.dataset.show.report.facts import build_facts, head_facts, why_no_atlas
 from generator.dataset.show.report.tiles import contact_sheet, thumbnails
+from generator.dataset.show.report.twins import collect_twins
 from generator.dataset.show.report.variety import collect_variety
 from generator.escape import html_json
 
@@ -54,6 +55,7 @@ def report_data(root: Path, progress: Callable[[int], None]) -> dict[str, Any]:
         "why_no_atlas": why_no_atlas(heads, atlas),
         **atlas.as_dict(),
         "variety": collect_variety(root, manifest, heads),
+        "twins": collect_twins(root, manifest),
         "sheet": contact_sheet(root, manifest, heads, poses, topology),
         "heads": head_facts(heads, thumbnails(root, manifest, heads, poses), atlas),
         "build": build_facts(root, manifest),
