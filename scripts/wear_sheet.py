@@ -25,7 +25,6 @@ from PIL import Image
 from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
-from generator.heads.mesh import HeadMesh
 from generator.heads.package import load_package, save_package
 from generator.heads.parametric.make import make_heads
 from generator.heads.source import find_heads
@@ -34,7 +33,7 @@ from generator.placing.rendering import read_image
 from generator.plan.config import load_config
 from generator.plan.settings import Landmarks
 from generator.plan.view_plan import plan_views
-from generator.plan.wear import STYLES
+from generator.plan.wear import STYLES, Worn
 from generator.registries import WORN
 from generator.worn.fit import CannotWear, Fit, Kind
 
@@ -64,51 +63,25 @@ def placed(lane: Lane, folder: Path, keep: Path, most: int) -> list[Path]:
     return found
 
 
-def together(meshes: list[HeadMesh]) -> HeadMesh:
-    """Several meshes as one; colours of materials go to the vertices where any has colours there."""
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    first = np.cumsum([0, *(len(mesh.materials) for mesh in meshes)])
-    return HeadMesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]).astype(
-            np.int32
-        ),
-        np.concatenate(
-            [np.zeros((len(mesh.triangles), 3, 2)) if mesh.uv is None else mesh.uv for mesh in meshes]
-        ),
-        np.concatenate([_colors(mesh) for mesh in meshes]),
-        np.concatenate([mesh.material_index + k for mesh, k in zip(meshes, first, strict=False)]).astype(
-            np.int32
-        ),
-        tuple(material for mesh in meshes for material in mesh.materials),
-    )
-
-
-def _colors(mesh: HeadMesh) -> np.ndarray:
-    if mesh.vertex_colors is not None:
-        return mesh.vertex_colors
-    colors = np.ones((len(mesh.vertices), 3))
-    palette = np.array([material.base_color for material in mesh.materials])
-    colors[mesh.triangles] = palette[mesh.material_index][:, None]
-    return colors
-
-
-def dressed(mesh: HeadMesh, points: np.ndarray, things: dict[str, str], seed: int) -> HeadMesh:
-    """A head with what it wears; what does not fit is said and left out."""
-    worn = [mesh]
+def dressed(fit: Fit, things: dict[str, str], seed: int, shift: np.ndarray, folder: Path) -> tuple[Worn, ...]:
+    """What a head wears, moved by shift, as packages in a folder; what does not fit is said and left out."""
+    worn = []
     for number, (kind, style) in enumerate(things.items()):
         maker: Kind = WORN.get(kind)
         others = {other: things[other] for other in maker.minds if other in things}
         start = time.perf_counter()
         try:
-            made = maker.make(Fit(mesh, points, others), style, np.random.default_rng([seed, number]))
+            rng = np.random.default_rng([seed, number])
+            made = maker.make(replace(fit, others=others), style, rng)
         except CannotWear as reason:
             print(f"{kind}:{style}: {reason}", file=sys.stderr)
             continue
         took = 1000 * (time.perf_counter() - start)
         print(f"{kind}:{style} {len(made.triangles)} triangles, {took:.0f} ms")
-        worn.append(made)
-    return together(worn) if len(worn) > 1 else mesh
+        path = folder / f"worn-{time.monotonic_ns()}.npz"
+        save_package(made, path)
+        worn.append(Worn(str(path), tuple(shift.tolist())))
+    return tuple(worn)
 
 
 def main() -> None:
@@ -117,7 +90,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("out", type=Path)
-    parser.add_argument("--wear", nargs="+", default=["none"], help="KIND:STYLE[,KIND:STYLE ...], a row each")
+    parser.add_argument("--wear", nargs="+", default=["none"], help="KIND:STYLE[,...], a row each")
     parser.add_argument("--heads", type=Path, nargs="*", default=[], help="folders of heads")
     parser.add_argument("--most", type=int, default=1, help="heads of each folder")
     parser.add_argument("--count", type=int, default=2, help="parametric heads")
@@ -150,12 +123,19 @@ def main() -> None:
             for things in rows:
                 for number, package in enumerate(packages):
                     mesh, points = load_package(package), np.load(package.with_suffix(".npy"))
-                    worn = dressed(mesh, points, things, given.variant + number)
-                    aim = np.array([0.0, -25.0, 0.0])
+                    shift = np.array([0.0, 25.0, 0.0])
+                    worn = dressed(
+                        Fit(mesh, points, scratch=scratch),
+                        things,
+                        given.variant + number,
+                        shift,
+                        Path(scratch),
+                    )
                     shown = Path(scratch) / "shown.npz"
-                    save_package(replace(worn, vertices=worn.vertices - aim), shown)
+                    save_package(replace(mesh, vertices=mesh.vertices + shift), shown)
                     views = plan_views(config, package.stem, given.radius, poses)
-                    tiles += [read_image(path) for path in lane.renderer.render(shown, views)]
+                    images = lane.renderer.render(shown, views, worn=(worn,) * len(views))
+                    tiles += [read_image(path) for path in images]
         finally:
             lane.close()
     Image.fromarray(sheet(tiles, given.columns or len(packages) * len(poses))).save(given.out)

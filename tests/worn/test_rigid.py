@@ -5,17 +5,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from where import SOURCES, behind_front_mm, covers, of_material
 
 from generator.heads.mesh import HeadMesh
+from generator.heads.package import save_package
 from generator.labels import GLASSES, HEADWEAR, MASK, OCCLUDER
-from generator.plan.wear import LENSES, STYLES
+from generator.placing.rendering import read_image
+from generator.plan.config import load_config
+from generator.plan.view_plan import plan_views
+from generator.plan.views import Views
+from generator.plan.wear import LENSES, STYLES, Worn
 from generator.registries import WORN
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear, Fit
+
+if TYPE_CHECKING:
+    from generator.execution.lanes.renderer import Renderer
 
 LABELS = {
     "glasses": GLASSES,
@@ -182,3 +192,25 @@ def test_what_is_before_the_face_stands_before_the_nose(
     assert 15 < things[:, 2].min() - nose[:, 2].max() < 65
     assert covers(made, fit, fit.points[[4]]).all()
     assert 60 < np.ptp(things[:, :2], axis=0).max() < 370, "as large as a hand, or a sheet of paper"
+
+
+@pytest.mark.parametrize("kind", LABELS)
+def test_every_style_is_seen_in_pixels(
+    fits: dict[str, Fit], renderer: Renderer, tmp_path: Path, kind: str
+) -> None:
+    fit = fits["facescape"]
+    head = tmp_path / "head.npz"
+    save_package(fit.mesh, head)
+    views = plan_views(
+        load_config(None, {"render": {"resolution": 96}}), "amy/neutral", 150.0, [(25.0, 0.0, 0.0)]
+    )
+    styles, worn = STYLES[kind][1:], []
+    for style in styles:
+        thing = tmp_path / f"{kind}-{style}.npz"
+        save_package(make(fit, kind, style), thing)
+        worn.append((Worn(str(thing)),))
+    many = Views(views.poses * (1 + len(styles)), views.cameras, views.looks)
+    images = [read_image(path).astype(float) for path in renderer.render(head, many, worn=((), *worn))]
+    for style, image in zip(styles, images[1:], strict=True):
+        changed = (np.abs(image - images[0]).max(axis=2) > 12).mean()
+        assert changed > (0.002 if style in ("rimless", "earbuds") else 0.006), f"{style}: {changed:.4f}"
