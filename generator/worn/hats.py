@@ -8,7 +8,7 @@ import numpy as np
 from generator.heads.mesh import Material
 from generator.labels import HEADWEAR
 from generator.worn.colours import CLOTH, Colour, drawn, luminance
-from generator.worn.crown import Crown, crown_of, ear_top, forehead
+from generator.worn.crown import Crown, crown_of
 from generator.worn.face import Face
 from generator.worn.shapes import Part, Shape, ball, closed_lattice, shell
 from generator.worn.wrap import smoothed, step
@@ -24,9 +24,9 @@ FELT: dict[Colour, float] = {
 STRAW: dict[Colour, float] = {(0.85, 0.74, 0.52): 3, (0.91, 0.86, 0.74): 2, (0.60, 0.45, 0.28): 1}
 
 
-def cap(face: Face, rng: np.random.Generator) -> list[Part]:
+def cap(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """A baseball cap of six panels, with a peak and a button."""
-    crown = crown_of(face, forehead(face, 0.62), ear_top(face) + 9, ear_top(face) - 24, 72)
+    crown = crown_of(face, "cap", 72, over)
     rows = np.concatenate([[0, 0.03], np.linspace(0.08, 0.97, 15)])
     front = np.cos(crown.turns / 2) ** 6
     distance = smoothed(crown.distances(rows), (1.0, 1.5), around=True) + 2.2
@@ -49,9 +49,9 @@ def cap(face: Face, rng: np.random.Generator) -> list[Part]:
     return parts
 
 
-def hard_hat(face: Face, rng: np.random.Generator) -> list[Part]:
+def hard_hat(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """A smooth shell with a ridge, a small brim and a short peak."""
-    crown = crown_of(face, forehead(face, 0.80), ear_top(face) + 18, ear_top(face) + 2, 72)
+    crown = crown_of(face, "hard-hat", 72, over)
     rows = np.concatenate([[0, 0.04], np.linspace(0.1, 0.98, 15)])
     distance = smoothed(crown.distances(rows), (2.0, 4.0), around=True) + 11
     distance += 9 * face.scale * np.sin(np.pi * rows / 2)[:, None]
@@ -72,12 +72,12 @@ def hard_hat(face: Face, rng: np.random.Generator) -> list[Part]:
     return [_dome(crown, outer, np.array(colour), 2.5, plastic), strip]
 
 
-def beanie(face: Face, rng: np.random.Generator) -> list[Part]:
+def beanie(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """A knitted hat with a turned-up cuff, over the tops of the ears."""
-    low = ear_top(face) - float(rng.uniform(6, 18))
-    crown = crown_of(face, forehead(face, float(rng.uniform(0.5, 0.8))), low, low - 16, 96)
+    low = float(rng.uniform(-6, 6))
+    crown = crown_of(face, "beanie", 96, over, (float(rng.uniform(-0.15, 0.15)), low, low))
     cuff = float(rng.uniform(0.30, 0.38)) if rng.random() < 0.8 else 0.0
-    rows = np.concatenate([np.linspace(0, 0.28, 5), [max(cuff, 0.30), max(cuff, 0.30) + 0.012]])
+    rows = np.concatenate([np.linspace(0, 0.28, 5), [max(cuff, 0.30), max(cuff, 0.30) + 0.004]])
     rows = np.concatenate([rows, np.linspace(rows[-1] + 0.06, 0.975, 11)])
     slouch = float(rng.uniform(6, 24)) * face.scale
     distance = smoothed(crown.distances(rows), (1.2, 3.0), around=True) + 3.0
@@ -102,10 +102,10 @@ def beanie(face: Face, rng: np.random.Generator) -> list[Part]:
     return parts
 
 
-def brimmed(face: Face, rng: np.random.Generator) -> list[Part]:
+def brimmed(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """A felt or straw hat with a ribbon and a brim."""
     straw = bool(rng.random() < 0.4)
-    crown = crown_of(face, forehead(face, 0.85), ear_top(face) + 9, ear_top(face) - 10, 72)
+    crown = crown_of(face, "brimmed", 72, over)
     rows = np.linspace(0, 1, 24)[:-1]
     inner = crown.distances(rows)
     points = crown.at(rows, inner)
@@ -162,10 +162,9 @@ def brimmed(face: Face, rng: np.random.Generator) -> list[Part]:
     return parts
 
 
-def headband(face: Face, rng: np.random.Generator) -> list[Part]:
+def headband(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """A band about the forehead and behind, over the tops of the ears."""
-    low = ear_top(face) + 1.0
-    crown = crown_of(face, forehead(face, float(rng.uniform(0.6, 0.8))), low, low - 22, 72)
+    crown = crown_of(face, "headband", 72, over, (float(rng.uniform(-0.1, 0.1)), 0.0, 0.0))
     wide = float(rng.uniform(38, 62)) * face.scale
     share = np.linspace(0, 1, 7)
     # As an angle of the front, where it is seen.

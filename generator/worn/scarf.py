@@ -27,7 +27,7 @@ LOOSE = 0.58
 """From here to the hem it hangs."""
 
 
-def scarf(face: Face, rng: np.random.Generator) -> list[Part]:
+def scarf(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     """Rings of cloth from the face's oval over the head and the neck down to a hem."""
     oval = face.at(*OVAL)
     chin, top, left, right = oval[0], oval[18], oval[9], oval[27]
@@ -48,7 +48,7 @@ def scarf(face: Face, rng: np.random.Generator) -> list[Part]:
         raise CannotWear("the head has no crown")
     throat = np.array([0.0, chin[1] - 22 * size, chin[2] - 48 * size])
     hem = _hem(turn, chin, size, float(rng.uniform(48, 62)))
-    over = np.stack(
+    crest = np.stack(
         [
             78 * size * np.sin(turn) * (0.6 + 0.4 * np.sin(turn) ** 2),
             (1 - low) * crown + low * throat[1] - 30 * size * np.sin(turn) ** 2,
@@ -66,7 +66,7 @@ def scarf(face: Face, rng: np.random.Generator) -> list[Part]:
     )
     nape = 0.5 * behind + 0.5 * hem
     nape[:, 2] = np.where(low < 0.5, np.maximum(nape[:, 2], -78 * size), nape[:, 2])
-    knots = np.stack([opening, over, behind, nape, hem])
+    knots = np.stack([opening, crest, behind, nape, hem])
     rough = PchipInterpolator([0, 0.34, 0.62, 0.80, 1.0], knots, axis=0)(np.linspace(0, 1, ROWS))
     loose = np.linspace(0, 1, ROWS)[:, None] > LOOSE
     centres = np.zeros_like(rough)
@@ -80,7 +80,7 @@ def scarf(face: Face, rng: np.random.Generator) -> list[Part]:
     distance = np.where(loose, np.maximum(length, np.fmin(surface, 1.12 * length)), surface)
     distance = np.where(np.isfinite(distance), distance, length)
     distance = _taut(face, centres, towards, distance, share, float(chin[1]), 0.5 * (left + right)[2])
-    distance = smoothed(distance, (1.0, 1.2), around=True) + FREE_MM
+    distance = smoothed(distance, (1.0, 1.2), around=True) + FREE_MM + over
     phase, waves = rng.random(3) * 2 * np.pi, rng.integers(5, 9)
     fold = np.sin(waves * turn + 5 * share + phase[0]) + 0.6 * np.sin(
         (waves + 4) * turn - 7 * share + phase[1]

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from generator.plan.wear import NOTHING
+from generator.worn.crown import DEPTH_MM, RIMS, rim_heights
+from generator.worn.face import Face
 from generator.worn.fit import Fit
 from generator.worn.skull import Skull
 
@@ -14,32 +17,39 @@ FLAT_MM = 3.0
 HIDDEN_MM = 18.0
 """Hair that is all so far above the rim is not made."""
 
+BAND, BAND_MM = "headband", 40.0
+"""A style above which hair is seen again, and by how much above its rim."""
+
 
 class Rim:
-    """The rim of what is on a head: a plane from the forehead to above the nape."""
+    """The rim of what is on a head, where its style has it."""
 
     def __init__(self, fit: Fit, skull: Skull) -> None:
-        top = fit.at(10)[0]
-        self._skull = skull
-        self._front = top[1] - 6 * skull.scale
-        self._back = skull.ears.top - 4 * skull.scale
-        self._ahead, self._behind = top[2], skull.centre[2] - 90 * skull.scale
+        self._skull, self._face = skull, Face.of(fit)
+        style = fit.others.get("headwear", NOTHING)
+        self._style = style if style in RIMS else "cap"
 
     def above(self, points: np.ndarray) -> np.ndarray:
         """How far points [..., 3] are above it, mm."""
-        share = (points[..., 2] - self._behind) / (self._ahead - self._behind)
-        return points[..., 1] - (self._back + share * (self._front - self._back))
+        there = points @ self._face.rotation
+        turns = np.arctan2(there[..., 0], there[..., 2] - DEPTH_MM)
+        return there[..., 1] - rim_heights(self._face, self._style, turns, (0.0, 0.0, 0.0))
 
     def flattened(self, paths: np.ndarray, layer: np.ndarray) -> np.ndarray:
         """Paths [N, K, 3] that fit under it. layer: [N], 0 for hair next to the skin to 1."""
         skull, flat = self._skull, paths.reshape(-1, 3)
         away = flat - skull.centre
         distance = np.linalg.norm(away, axis=1)
-        room = FLAT_MM + np.maximum(-self.above(flat) - 2 * skull.scale, 0)
+        above = self.above(flat)
+        room = FLAT_MM + np.maximum(-above - 2 * skull.scale, 0)
+        if self._style == BAND:
+            room += np.maximum(above - BAND_MM * skull.scale, 0)
         most = skull.radius(flat) + room * np.repeat(0.35 + 0.65 * layer, paths.shape[1])
         pressed = np.minimum(distance, most) / distance
         return (skull.centre + away * pressed[:, None]).reshape(paths.shape)
 
     def hides(self, paths: np.ndarray) -> np.ndarray:
         """Which paths [N, K, 3] nobody sees: bool [N]."""
+        if self._style == BAND:
+            return np.zeros(len(paths), dtype=bool)
         return (self.above(paths) > HIDDEN_MM * self._skull.scale).all(axis=1)

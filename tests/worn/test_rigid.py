@@ -147,7 +147,7 @@ def test_a_hat_leaves_the_lobes_of_the_ears(fits: dict[str, Fit], style: str) ->
     assert ear.found
     low = face.vertices[
         (face.vertices[:, 0] > 60)
-        & (face.vertices[:, 1] < ear.top - 25)
+        & (face.vertices[:, 1] < ear.top - 34)
         & (face.vertices[:, 1] > ear.bottom)
         & (face.vertices[:, 2] < ear.front)
         & (face.vertices[:, 2] > ear.back)
