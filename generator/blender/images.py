@@ -14,15 +14,16 @@ from generator.blender import compat
 from generator.blender.clearing import clear
 from generator.blender.crop import Backdrop, Backdrops, Box, Outline, around
 from generator.blender.needs import Needs
-from generator.blender.passes import render_painted, render_passes
+from generator.blender.passes import painting, render_passes
 from generator.blender.stage import Stage
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import load_package
 from generator.labels import LABELS
 from generator.plan.environment_light import EnvironmentLight
-from generator.plan.passes import PAINTED_SAMPLES
+from generator.plan.passes import LABELS_A_PICTURE, PAINTED_SAMPLES, SEGMENTATION, painted_file
+from generator.plan.settings import Look
 from generator.plan.shading import unshaded
-from generator.plan.views import View
+from generator.plan.views import View, Views
 from generator.plan.wear import Worn
 
 
@@ -116,16 +117,31 @@ class Images:
         render_passes(path, stage.head, stage.objects[1:], passes)
 
     def render_painted(
-        self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()
+        self, views: Views, paths: Sequence[Path], passes: Sequence[str], worn: Sequence[Sequence[Worn]]
     ) -> None:
-        """Render the painted passes of a view beside path; see :mod:`generator.blender.passes`."""
-        look = replace(view.look, preset="fast", samples=PAINTED_SAMPLES)
-        stage = self._show(replace(view, look=look), None, worn)
+        """Render painted passes of some views, each beside its path; see :func:`painting`.
+
+        Of classes that nothing in a view has there is no picture. What is shown changes once for all views:
+        that costs more than a picture.
+        """
+        bare = [replace(view, look=Look(samples=PAINTED_SAMPLES)) for view in views]
+        stage = self._show(bare[0], None, worn[0])
+        labels = [self._labels(things) for things in worn]
+        with painting(stage, passes) as shown:
+            for name, group in shown:
+                there = {*LABELS[LABELS_A_PICTURE * group :][:LABELS_A_PICTURE]}
+                for view, path, things, classes in zip(bare, paths, worn, labels, strict=True):
+                    if name != SEGMENTATION.name or there & classes:
+                        stage.show(view, None, things)
+                        target = path.with_name(painted_file(path.stem, name, group))
+                        _render_again(target, self._box(view, things))
+
+    def _labels(self, worn: Sequence[Worn]) -> set[str]:
+        """The classes that the head and what it wears may have."""
         meshes = [self._mesh, *(self._worn[one.package] for one in worn)]
         materials = [material for mesh in meshes for material in mesh.materials]
         mapped = any(material.label_map for material in materials)
-        labels = LABELS if mapped else {material.label for material in materials}
-        render_painted(path, stage.objects, labels, passes)
+        return {*LABELS} if mapped else {material.label for material in materials}
 
     def _box(self, view: View, worn: Sequence[Worn]) -> Box | None:
         """The pixels that the head and what it wears can cover."""
@@ -165,8 +181,14 @@ def _render(path: Path, box: Box | None = None, *, over_nothing: bool = False) -
         settings.file_format, settings.color_mode = "BMP", "RGB"
     else:
         raise ValueError(f"{path}: images are .bmp or .exr")
+    _render_again(path, box, cropped=not over_nothing)
+
+
+def _render_again(path: Path, box: Box | None, *, cropped: bool = False) -> None:
+    """Render the scene with the settings of an image as they stand, or the pixels of a box alone."""
+    render = bpy.context.scene.render
     render.use_border = box is not None
-    render.use_crop_to_border = box is not None and not over_nothing
+    render.use_crop_to_border = box is not None and cropped
     if box is not None:
         # Blender cuts to whole pixels; a quarter more keeps rounding from losing one.
         left, right = ((edge + 0.25) / render.resolution_x for edge in box[:2])

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,8 +12,10 @@ import bpy
 from generator.blender import compat
 from generator.blender.label_group import tell_apart
 from generator.blender.materials import ALBEDO, LABELLED, LIT, show
+from generator.blender.stage import Stage
 from generator.labels import LABELS
-from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, painted_file
+from generator.plan.passes import ALBEDO as ALBEDO_PASS
+from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, SEGMENTATION
 from generator.registries import PASSES
 
 HEAD_INDEX, WORN_INDEX = 1, 2
@@ -52,35 +54,40 @@ def render_passes(
         setattr(layer, switch, False)
 
 
-def render_painted(
-    path: Path, things: Sequence[bpy.types.Object], labels: Iterable[str], passes: Sequence[str]
-) -> None:
-    """Render the painted passes among some beside path, linear with alpha; see ``painted_file``.
+@contextmanager
+def painting(stage: Stage, passes: Sequence[str]) -> Iterator[Iterator[tuple[str, int]]]:
+    """Have a stage show its materials' colours, and then one group of their classes after another.
 
-    things: everything that is seen. labels: the classes that there may be; of others there is no picture.
+    Yields (pass, group) as long as there is another; what is rendered then is linear, with alpha, the mean
+    over each pixel itself and not over its neighbours.
     """
     scene = bpy.context.scene
     render, settings = scene.render, scene.render.image_settings
-    materials = [material for thing in things for material in thing.data.materials]
-    groups = sorted({LABELS.index(label) // LABELS_A_PICTURE for label in labels})
-    wanted = [(ALBEDO, 0)] if "albedo" in passes else []
-    wanted += [(LABELLED, group) for group in groups] if "segmentation" in passes else []
     compat.use_still_images(settings)
     settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
     settings.exr_codec = "NONE"
     with _restored(scene.cycles, "pixel_filter_type", "filter_width"), _restored(render, "film_transparent"):
-        # The mean over the pixel itself, not over its neighbours.
         scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
         render.film_transparent, render.use_border = True, False
-        for what, group in wanted:
+        yield _shown(stage, passes)
+    _show(stage, LIT)
+
+
+def _shown(stage: Stage, passes: Sequence[str]) -> Iterator[tuple[str, int]]:
+    if ALBEDO_PASS.name in passes:
+        _show(stage, ALBEDO)
+        yield ALBEDO_PASS.name, 0
+    if SEGMENTATION.name in passes:
+        _show(stage, LABELLED)
+        for group in range(len(LABELS) // LABELS_A_PICTURE):
             tell_apart(group)
-            for material in materials:
-                show(material, what)
-            name = "albedo" if what == ALBEDO else "segmentation"
-            render.filepath = str(path.with_name(painted_file(path.stem, name, group)))
-            bpy.ops.render.render(write_still=True)
-    for material in materials:
-        show(material, LIT)
+            yield SEGMENTATION.name, group
+
+
+def _show(stage: Stage, what: str) -> None:
+    for thing in stage.objects:
+        for material in thing.data.materials:
+            show(material, what)
 
 
 @contextmanager

@@ -126,9 +126,9 @@ class RenderWorker:
         worn = order.worn or ((),) * len(order.views)
         for view, path, things in zip(order.views, paths, worn, strict=True):
             images.render_passes(view, path, order.passes, things)
-        for place, (view, path, things) in enumerate(zip(order.views, paths, worn, strict=True)):
-            if painted:
-                images.render_painted(view, path, painted, things)
+        if painted:
+            images.render_painted(order.views, paths, painted, worn)
+        for place, path in enumerate(paths):
             answer(Rendered(place, str(path)))
 
     def _convert(self, order: ConvertOrder) -> None:

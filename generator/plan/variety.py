@@ -4,8 +4,34 @@
 from __future__ import annotations
 
 from generator.plan.setting import Choice
+from generator.plan.wear import STYLES
 
 NONE = "none"
+
+
+def _some(kind: str, share: float, *, of_head: bool = False) -> str:
+    """Any style of something worn in about such a share of the images, or of the heads, else the first."""
+    first, *others = STYLES[kind]
+    plain = [first] * round(len(others) * (1 - share) / share)
+    return f"{'head:' if of_head else ''}choice:{','.join([*plain, *others])}"
+
+
+_WEAR: dict[str, object] = {
+    # Hair, beard and clothes are a person's, as are colours; the rest is put on and taken off.
+    "hair": _some("hair", 0.75, of_head=True),
+    "brows": _some("brows", 0.25, of_head=True),
+    "beard": _some("beard", 0.15, of_head=True),
+    "clothes": _some("clothes", 0.9, of_head=True),
+    "glasses": _some("glasses", 0.25),
+    "lenses": "choice:clear,clear,clear,clear,tinted,dark,mirror",
+    "headwear": _some("headwear", 0.15),
+    "headphones": _some("headphones", 0.05),
+    "mask": _some("mask", 0.06),
+    "occluder": _some("occluder", 0.06),
+    "occluder_x": "normal:0,0.4",
+    "occluder_y": "normal:0.3,0.4",
+    "wear_variant": "head:uniform:0,1",
+}
 
 _PHOTO: dict[str, object] = {
     # Photographs of people are taken from arm's length to across a street, and zoomed or cut to the face.
@@ -19,10 +45,11 @@ _PHOTO: dict[str, object] = {
     "ambient": "uniform:0.15,0.75",
     "environment": "choice:all",
     "environment_yaw_deg": "uniform:-180,180",
-    "environment_strength": "log-uniform:0.6,1.5",
+    "environment_strength": "log-uniform:0.5,1.2",
     "environment_key": "choice:0,0,0,0.3",
     "backdrop": "choice:environment,environment,noise,plain",
     "background": ["normal:0.65,0.13", "normal:0.65,0.13", "normal:0.65,0.13"],
+    **_WEAR,
     "exposure_ev": "normal:0,0.4",
     "warmth": "normal:0,0.25",
     "contrast": "normal:0.1,0.25",
@@ -56,6 +83,6 @@ VARIETY: dict[str, dict[str, object]] = {NONE: {}, "photo": _PHOTO, "all": _ALL}
 
 CHOICES = (
     Choice(NONE, "Every image as the settings say"),
-    Choice("photo", "Cameras and light as in photographs"),
+    Choice("photo", "Cameras, light and people as in photographs"),
     Choice("all", "As photo, and farther than that in everything"),
 )
