@@ -53,7 +53,7 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
         return face.back(assemble(_buds(face, rng)))
     hat, hair = fit.others.get("headwear", NOTHING), fit.others.get("hair", OWN)
     if hat != NOTHING and hat not in OVER_MM:
-        raise CannotWear(f"no band goes over a {hat}")
+        raise CannotWear(f"no band goes over headwear of style {hat}")
     over = OVER_MM.get(hat, 0.0) + (OVER_HAIR_MM if hair not in (OWN, NOTHING) and hat == NOTHING else 0.0)
     cup, colour = _CUPS[style], drawn(PLASTIC, rng)
     accent = drawn(PLASTIC, rng) if rng.random() < 0.35 else colour

@@ -10,6 +10,8 @@ from scipy.spatial import ConvexHull, QhullError
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear
 
+RAYS = 256
+
 
 def directions(turn: np.ndarray, lift: np.ndarray) -> np.ndarray:
     """Unit vectors in F of angles in radians: turn about y, 0 is forward and above zero right; lift is up."""
@@ -50,13 +52,21 @@ class Taut:
 
         origins: of each, float [..., 3], or the centre. From outside, a number below zero may come.
         """
-        facing = towards.reshape(-1, 3) @ self._normals.T
-        room = self._distances
-        if origins is not None:
-            room = room - (origins - self._centre).reshape(-1, 3) @ self._normals.T
-        with np.errstate(divide="ignore"):
-            lengths = np.where(facing > 1e-9, room / np.maximum(facing, 1e-9), np.inf)
-        return lengths.min(axis=1).reshape(towards.shape[:-1])
+        rays = towards.reshape(-1, 3)
+        some = range(0, len(rays), RAYS)  # not all at once: a hull has thousands of planes
+        if origins is None:
+            poles = self._normals / self._distances[:, None]
+            lengths = [1 / (rays[k : k + RAYS] @ poles.T).max(axis=1) for k in some]
+        else:
+            away = (origins - self._centre).reshape(-1, 3)
+            lengths = [self._exit(away[k : k + RAYS], rays[k : k + RAYS]) for k in some]
+        return np.concatenate(lengths).reshape(towards.shape[:-1])
+
+    def _exit(self, origins: np.ndarray, rays: np.ndarray) -> np.ndarray:
+        facing = rays @ self._normals.T
+        room = self._distances - origins @ self._normals.T
+        # Of planes that a ray does not face the exit is far, far away.
+        return (room / np.maximum(facing, 1e-9)).min(axis=1)
 
 
 def smoothed(values: np.ndarray, sigma: float | tuple[float, float], around: bool = False) -> np.ndarray:
