@@ -26,6 +26,7 @@ if str(ROOT) not in sys.path:
 from generator.cli.settings_table import section_table  # noqa: E402
 from generator.dataset.show.column_tables import heads_table, rows_table  # noqa: E402
 from generator.dataset.show.format_tables import (  # noqa: E402
+    factors_table,
     formats_table,
     missing_table,
     passes_table,
@@ -46,6 +47,7 @@ DOCS: dict[str, dict[str, Callable[[], str]]] = {
         "rows without a face": missing_table,
     },
     "docs/passes.md": {"passes": passes_table},
+    "docs/twins.md": {"factors": factors_table},
     "docs/configuration.md": {name: _section(name) for name in SECTIONS},
 }
 """File -> name of a part -> the function that gives its text, Markdown."""

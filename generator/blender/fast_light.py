@@ -13,7 +13,7 @@ import bpy
 from generator.blender.environment import form_of, set_form
 from generator.blender.lamps import key_direction, key_strengths, lamp_light
 from generator.blender.needs import Needs
-from generator.blender.nodes import BLACK, math_node, vector_node
+from generator.blender.nodes import BLACK, math_node, scaled, vector_node
 from generator.blender.shine import set_lamp, set_surroundings, shine
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
@@ -92,9 +92,14 @@ class _Group:
         tree.links.new(light, out[LIGHT])
         if glossy:
             suns = (_SUN,) if needs.environment else ()
-            seen = shine(tree, given[NORMAL], given[GLOSS], (_KEY, *suns, *self._lamps), needs.environment)
-            if shares is not None:
-                seen = vector_node(tree, "MULTIPLY", seen, shares.direct)
+            seen = shine(
+                tree,
+                given[NORMAL],
+                given[GLOSS],
+                (_KEY, *suns, *self._lamps),
+                environment=needs.environment,
+                share=shares.direct if shares else None,
+            )
             tree.links.new(seen, out[SHINE])
 
     def set(self, look: Look, environment: EnvironmentLight | None) -> None:
@@ -183,7 +188,7 @@ def _environment_light(
     """That of a panorama, and its sun, and more."""
     light = form_of(tree, normal, _IRRADIANCE)
     if shares is not None:
-        light = vector_node(tree, "MULTIPLY", light, shares.ambient)
+        light = scaled(tree, light, shares.ambient)
     return vector_node(tree, "ADD", _lamp(tree, normal, shares, _SUN, light), more)
 
 

@@ -21,6 +21,17 @@ def math_node(
     return node.outputs[0]
 
 
+def scaled(
+    tree: bpy.types.NodeTree, vector: bpy.types.NodeSocket, factor: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """A vector times a number, without a node that makes a vector of the number."""
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = "SCALE"
+    tree.links.new(vector, node.inputs[0])
+    tree.links.new(factor, node.inputs["Scale"])
+    return node.outputs[0]
+
+
 def vector_node(
     tree: bpy.types.NodeTree, operation: str, *inputs: bpy.types.NodeSocket | None
 ) -> bpy.types.NodeSocket:

@@ -4,20 +4,18 @@
 A lobe about the mirrored view, exp(s (cosine - 1)) with s = 1 / (2 a^2) for a GGX roughness a, the spherical
 Gaussian of Wang et al., "All-frequency rendering of dynamic, spatially-varying reflectance" (SIGGRAPH Asia
 2009); it sends back all the light it gets, times Schlick's Fresnel term. No lamp is a point: its own width is
-added. The surroundings are the nine terms of their irradiance, of which less is blurred away (Ramamoorthi and
-Hanrahan, "A signal-processing framework for reflection", ACM TOG 23(4), 2004).
+added. The surroundings are degree 0 and 1 of the terms of their irradiance, of which less is blurred away
+(Ramamoorthi and Hanrahan, "A signal-processing framework for reflection", ACM TOG 23(4), 2004).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from generator.blender.environment import form_of, set_form
-from generator.blender.nodes import BLACK, math_node, vector_node
+from generator.blender.nodes import math_node, scaled, vector_node
 from generator.plan.environment_light import EnvironmentLight
 
 FACING = 0.028
@@ -26,8 +24,8 @@ FACING = 0.028
 LAMP_WIDTH = 0.012
 """1 / s of a lamp as wide as the quality preset's: a disc of 25 degrees."""
 
-BLURRED = (1.15, 1.7)
-"""Of degree 1 and 2 in a lobe as wide as skin's (s about 4), over what irradiance keeps of them."""
+LESS_BLURRED = 1.15
+"""What a lobe as wide as skin's (s about 4) keeps of degree 1, over what irradiance does."""
 
 _MIRRORED = "mirrored"
 
@@ -37,9 +35,12 @@ def shine(
     normal: bpy.types.NodeSocket,
     gloss: bpy.types.NodeSocket,
     lamps: Sequence[str],
+    *,
     environment: bool,
+    share: bpy.types.NodeSocket | None,
 ) -> bpy.types.NodeSocket:
-    """Light that a surface mirrors, beside its colour. lamps: names, for :func:`set_lamp`."""
+    """Light that a surface mirrors, beside its colour. lamps: names, for :func:`set_lamp`. share: of light
+    that is not kept out; None is all."""
     geometry = tree.nodes.new("ShaderNodeNewGeometry")
     view = geometry.outputs["Incoming"]
     # Of a vector towards the viewer this is where the mirrored ray comes from: the reverse of where it goes.
@@ -68,8 +69,17 @@ def shine(
     around = vector_node(tree, "MULTIPLY_ADD", spots, half, None)
     around.node.name = _MIRRORED
     if environment:
-        around = vector_node(tree, "ADD", around, form_of(tree, reverse.outputs[0], _MIRRORED))
-    return vector_node(tree, "MULTIPLY", around, _share(tree, facing.outputs["Value"], gloss, roughness))
+        combined = tree.nodes.new("ShaderNodeCombineXYZ")
+        for color, socket in zip("rgb", combined.inputs, strict=True):
+            along = tree.nodes.new("ShaderNodeVectorMath")
+            along.operation, along.name = "DOT_PRODUCT", f"{_MIRRORED} {color}"
+            tree.links.new(reverse.outputs[0], along.inputs[0])
+            tree.links.new(along.outputs["Value"], socket)
+        around = vector_node(tree, "ADD", around, combined.outputs[0])
+    mirrored_share = _fresnel(tree, facing.outputs["Value"], gloss)
+    if share is not None:
+        mirrored_share = math_node(tree, "MULTIPLY", mirrored_share, share)
+    return scaled(tree, around, mirrored_share)
 
 
 def set_lamp(nodes: bpy.types.Nodes, name: str, direction: Sequence[float], color: Sequence[float]) -> None:
@@ -79,22 +89,20 @@ def set_lamp(nodes: bpy.types.Nodes, name: str, direction: Sequence[float], colo
 
 
 def set_surroundings(
-    nodes: bpy.types.Nodes, ambient: float, environment: EnvironmentLight | None, form: bool
+    nodes: bpy.types.Nodes, ambient: float, environment: EnvironmentLight | None, varied: bool
 ) -> None:
-    """ambient: white light from everywhere. form: are there nodes for an environment?"""
-    nodes[_MIRRORED].inputs[2].default_value = (ambient, ambient, ambient)
-    if form:
-        set_form(nodes, _MIRRORED, mirrored(environment) if environment else None)
+    """ambient: white light from everywhere. varied: are there nodes for an environment?
 
-
-def mirrored(light: EnvironmentLight) -> EnvironmentLight:
-    """The terms of what a lobe sees in the reverse of its direction: less blurred than irradiance is."""
-    first, second = BLURRED
-    one, *odd_and_even = np.array(light.terms)
-    odd, even = np.array(odd_and_even[:3]), np.array(odd_and_even[3:])
-    mean = (even[3] + even[4]) / 3  # of xx and yy, which is no part of degree 2
-    terms = np.stack([one + (1 - second) * mean, *(-first * odd), *(second * even)])
-    return replace(light, terms=tuple(map(tuple, terms.tolist())), least=BLACK)
+    Of its terms a lobe sees the mean, and more of degree 1 than irradiance has; degree 2 is left out, as most
+    of it is of what skin mirrors.
+    """
+    mean, gradient = np.full(3, ambient), np.zeros((3, 3))
+    if environment is not None:
+        terms = np.array(environment.terms)
+        mean, gradient = mean + terms[0] + (terms[7] + terms[8]) / 3, -LESS_BLURRED * terms[1:4]
+    nodes[_MIRRORED].inputs[2].default_value = mean.tolist()
+    for color, part in zip("rgb", gradient.T if varied else (), strict=False):
+        nodes[f"{_MIRRORED} {color}"].inputs[1].default_value = part.tolist()
 
 
 def _sharpness(tree: bpy.types.NodeTree, roughness: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
@@ -103,21 +111,18 @@ def _sharpness(tree: bpy.types.NodeTree, roughness: bpy.types.NodeSocket) -> bpy
     return math_node(tree, "DIVIDE", 1.0, width)
 
 
-def _share(
-    tree: bpy.types.NodeTree,
-    facing: bpy.types.NodeSocket,
-    gloss: bpy.types.NodeSocket,
-    roughness: bpy.types.NodeSocket,
+def _fresnel(
+    tree: bpy.types.NodeTree, facing: bpy.types.NodeSocket, gloss: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
     """What of the light is mirrored at a cosine towards the viewer; nothing without gloss.
 
-    Schlick's Fresnel term, and his masking (with k = a / 2): what is rough hides itself at its rim.
+    Schlick's term, that rises to the gloss cubed instead of 1: what is rough hides itself at its rim. All but
+    three of the nodes compute constants, which Cycles does beforehand.
     """
+    some = math_node(tree, "GREATER_THAN", gloss, 0.0)
+    straight = math_node(tree, "MULTIPLY", some, FACING)
+    rim = math_node(tree, "MAXIMUM", math_node(tree, "POWER", gloss, 3.0), straight)
     away = math_node(tree, "SUBTRACT", 1.0, facing)
     away.node.use_clamp = True
-    fresnel = math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", away, 5.0), 1 - FACING, FACING)
-    k = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", roughness, roughness), 0.5)
-    seen = math_node(tree, "MULTIPLY_ADD", facing, math_node(tree, "SUBTRACT", 1.0, k), k)
-    masked = math_node(tree, "DIVIDE", math_node(tree, "MULTIPLY", facing, fresnel), seen)
-    masked.node.use_clamp = True
-    return math_node(tree, "MULTIPLY", masked, math_node(tree, "GREATER_THAN", gloss, 0.0))
+    rise = math_node(tree, "SUBTRACT", rim, straight)
+    return math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", away, 5.0), rise, straight)

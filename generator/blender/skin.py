@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The relief of skin: furrows of some millimetres down to pores, from noise that sticks to the head.
 
-A noise of three numbers leans the normal, which is what a height of that noise would do, in a third of the
-time. It has no waves that are shorter than two pixels: an image of a face from afar has no pores.
+A noise of three numbers leans the normal, whatever way it faces, as the slopes of such a height would, in a
+third of the time. No wave of it is shorter than two pixels: an image of a face from afar has no pores.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import bpy
 
-from generator.blender.nodes import BLACK, math_node, vector_node
+from generator.blender.nodes import BLACK, math_node, scaled, vector_node
 
 LONGEST_MM = 2.5
 """Wavelength of the coarsest waves; each octave halves it."""
@@ -49,32 +49,30 @@ def relief(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> Skin:
     centred.operation = "SUBTRACT"
     tree.links.new(noise.outputs["Color"], centred.inputs[0])
     centred.inputs[1].default_value = (0.5, 0.5, 0.5)
-    turned = tree.nodes.new("ShaderNodeVectorTransform")
-    turned.vector_type, turned.convert_from, turned.convert_to = "VECTOR", "OBJECT", "WORLD"
-    tree.links.new(centred.outputs[0], turned.inputs[0])
     smooth = tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
-    leaned = vector_node(tree, "MULTIPLY_ADD", turned.outputs[0], None, smooth)
+    leaned = vector_node(tree, "MULTIPLY_ADD", centred.outputs[0], None, smooth)
     leaned.node.name = _LEAN
     # Not all at once: without a detail the normal is the very one that there is without these nodes.
     change = vector_node(tree, "SUBTRACT", vector_node(tree, "NORMALIZE", leaned), smooth)
     normal = vector_node(tree, "MULTIPLY_ADD", change, None, smooth)
     normal.node.name = _SWITCH
-    height = tree.nodes.new("ShaderNodeSeparateXYZ")
-    tree.links.new(centred.outputs[0], height.inputs[0])
-    shade = math_node(tree, "MULTIPLY_ADD", height.outputs[0], 0.0, 1.0)
+    shade = math_node(tree, "MULTIPLY_ADD", noise.outputs["Fac"], 0.0, 1.0)
     shade.node.name = _SHADE
-    return Skin(vector_node(tree, "MULTIPLY", color, shade), normal)
+    return Skin(scaled(tree, color, shade), normal)
 
 
 def set_relief(tree: bpy.types.NodeTree, detail: float, pixel_mm: float) -> None:
     """detail: 0 is smooth, 1 is skin. pixel_mm: what a pixel covers on the head."""
     waves = math.log2(LONGEST_MM / (2 * pixel_mm))
     strength = detail * min(1.0, 2.0 ** min(waves, 0.0))  # what is shorter than two pixels fades
-    tree.nodes[_NOISE].inputs["Detail"].default_value = min(max(waves, 0.0), MOST_OCTAVES)
+    # Whole octaves: a part of one takes as long as all of it.
+    tree.nodes[_NOISE].inputs["Detail"].default_value = float(math.floor(min(max(waves, 0.0), MOST_OCTAVES)))
     lean = LEAN * strength
     tree.nodes[_LEAN].inputs[1].default_value = (lean, lean, lean)
     tree.nodes[_SWITCH].inputs[1].default_value = (1.0, 1.0, 1.0) if lean else BLACK
-    tree.nodes[_SHADE].inputs[1].default_value = SHADE * strength
+    shade = SHADE * strength
+    tree.nodes[_SHADE].inputs[1].default_value = shade
+    tree.nodes[_SHADE].inputs[2].default_value = 1.0 - shade / 2
 
 
 def has_relief(tree: bpy.types.NodeTree) -> bool:

@@ -149,9 +149,11 @@ def register(app: typer.Typer) -> None:
 def _print_result(result: Any, seconds: float, as_json: bool) -> None:
     manifest = result.manifest
     rate = manifest.detected_rows / manifest.rows
+    twins = sum(part.rows for part in manifest.twins)
     facts = {
         "dataset": str(result.root),
         "rows": manifest.rows,
+        **({"twins": twins} if twins else {}),
         "heads": manifest.heads,
         "detection_rate": round(rate, 4),
         "skipped_heads": len(result.skipped),
@@ -171,6 +173,8 @@ def _print_result(result: Any, seconds: float, as_json: bool) -> None:
         f"read      pandas.read_parquet({str(result.root / 'data')!r})",
         f"check     headturn verify {shlex.quote(str(result.root))}",
     ]
+    if twins:
+        lines.insert(2, f"twins     {plural(twins, 'twin')} of rows; headturn ablate compares them")
     if result.skipped:
         lines.append(f"left out  {plural(len(result.skipped), 'head')}: see {result.root / 'manifest.json'}")
     if result.failed_units:

@@ -28,6 +28,9 @@ MOST, LEAST = 64, 6
 AVERAGED = 160
 """Rays that a vertex and its neighbours have together, once they are averaged."""
 
+SHEET = 0.25
+"""Less open than that is where nobody looks, or the inner side of a sheet."""
+
 LIFT_MM = 0.2
 """How far above the surface rays start: a face is wider than a thousand of these."""
 
@@ -61,6 +64,9 @@ def openness(mesh: HeadMesh, surface: Surface) -> np.ndarray:
     for start in range(0, count, BATCH):
         some = slice(start, min(start + BATCH, count))
         found[some] = _open_share(surface, points[some], normals[some], rays, start)
+    # A sheet, such as hair that hangs, has two sides and one value: the one that is more open.
+    dark = np.flatnonzero(found < SHEET)
+    found[dark] = np.maximum(found[dark], _open_share(surface, points[dark], -normals[dark], rays, 0))
     average = _averaging(mesh)
     for _ in range(max(1, round(np.log2(AVERAGED / rays)))):
         found = average @ found

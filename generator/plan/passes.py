@@ -13,7 +13,7 @@ from generator.labels import LABELS
 PAINTED = ""
 """The switch of passes that are rendered with materials of their own."""
 
-PAINTED_SAMPLES = 16
+PAINTED_SAMPLES = 8
 """Of which each pixel of theirs is the mean."""
 
 

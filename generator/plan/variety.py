@@ -33,6 +33,21 @@ _WEAR: dict[str, object] = {
     "wear_variant": "head:uniform:0,1",
 }
 
+_SHADING: dict[str, object] = {
+    # A flash or a window beside the light of the place, seldom a lamp behind the head; skin is a person's.
+    "lamp1_strength": "choice:0,0,0,0.2,0.4",
+    "lamp1_yaw_deg": "uniform:-110,110",
+    "lamp1_pitch_deg": "uniform:-20,60",
+    "lamp1_warmth": "normal:0,0.8",
+    "lamp2_strength": "choice:0,0,0,0,0.4,0.8",
+    "lamp2_yaw_deg": "choice:-160,-140,-120,120,140,160",
+    "lamp2_pitch_deg": "uniform:0,60",
+    "lamp2_warmth": "normal:0,1",
+    "occlusion": "uniform:0.7,1",
+    "gloss": "head:uniform:0.3,0.55",
+    "skin_detail": "head:uniform:0.4,1",
+}
+
 _PHOTO: dict[str, object] = {
     # Photographs of people are taken from arm's length to across a street, and zoomed or cut to the face.
     "distance_mm": "log-uniform:400,8000",
@@ -48,7 +63,8 @@ _PHOTO: dict[str, object] = {
     "environment_strength": "log-uniform:0.5,1.2",
     "environment_key": "choice:0,0,0,0.3",
     "backdrop": "choice:environment,environment,noise,plain",
-    "background": ["normal:0.65,0.13", "normal:0.65,0.13", "normal:0.65,0.13"],
+    "background": ["normal:0.65,0.09", "normal:0.65,0.09", "normal:0.65,0.09"],
+    **_SHADING,
     **_WEAR,
     "exposure_ev": "normal:0,0.4",
     "warmth": "normal:0,0.25",
@@ -70,6 +86,19 @@ _ALL: dict[str, object] = {
     "environment_strength": "log-uniform:0.3,3",
     "environment_key": "uniform:0,1",
     "background": ["uniform:0,1", "uniform:0,1", "uniform:0,1"],
+    "lamp1_strength": "choice:0,0,0.3,0.6,1.2",
+    "lamp1_yaw_deg": "uniform:-180,180",
+    "lamp1_pitch_deg": "uniform:-60,90",
+    "lamp1_warmth": "normal:0,2",
+    "lamp2_strength": "choice:0,0,0.5,1,2",
+    "lamp2_warmth": "normal:0,2",
+    "lamp3_strength": "choice:0,0,0,0.5,1",
+    "lamp3_yaw_deg": "uniform:-180,180",
+    "lamp3_pitch_deg": "uniform:-60,90",
+    "lamp3_warmth": "normal:0,2",
+    "occlusion": "uniform:0,1",
+    "gloss": "uniform:0,0.8",
+    "skin_detail": "uniform:0,2",
     "exposure_ev": "normal:0,1",
     "warmth": "normal:0,0.6",
     "defocus_px": "uniform:0,3",

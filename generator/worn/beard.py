@@ -17,7 +17,6 @@ from generator.worn.lower_face import AREAS, GRID, RISES, TURNS, LowerFace, find
 from generator.worn.skull import without_hair
 from generator.worn.strips import Piece, across, join, strips, worn_mesh
 
-GLOSS = 0.2
 MOST_TRIANGLES = 18_000
 """Of hairs."""
 
@@ -32,7 +31,8 @@ DOWN = np.array([0.0, -1.0, 0.0])
 class Trim:
     """A beard. area: of :data:`generator.worn.lower_face.AREAS`. hairs: a thousand square mm. length, width:
     mm, at the chin. lift: how steeply hair leaves the skin. points: of each hair. cover: how much of the skin
-    the undercoat hides. chin: how much shorter it is at the ears."""
+    the undercoat hides. ears: share of its length that it has there. fine: share of the skin's colour in that
+    of a hair thinner than a pixel. ragged: degrees within which the area begins."""
 
     area: str
     hairs: float
@@ -42,10 +42,12 @@ class Trim:
     points: int
     cover: float
     ears: float = 0.5
+    fine: float = 0.0
+    ragged: float = 2.0
 
 
 TRIMS = {
-    "stubble": Trim("full", 460, 2.8, 0.85, 0.5, 2, 0.58, 0.8),
+    "stubble": Trim("full", 460, 2.8, 0.85, 0.5, 2, 0.5, 0.8, 0.35, 5.0),
     "moustache": Trim("moustache", 900, 11, 1.4, 0.4, 4, 0.75),
     "goatee": Trim("goatee", 330, 13, 1.4, 0.4, 4, 0.75),
     "full": Trim("full", 150, 15, 1.8, 0.4, 4, 0.8),
@@ -59,15 +61,16 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
         raise CannotWear("a mask covers it")
     bald = without_hair(fit)
     face, trim = find_lower_face(bald), TRIMS[style]
-    color = 0.92 * natural_hair_color(complexion(bald), rng) + [0.012, 0.004, 0.0]
+    look = complexion(bald)
+    color = 0.92 * natural_hair_color(look, rng) + np.array([0.012, 0.004, 0.0])
     grey = rng.uniform(0, 0.4) if rng.random() < 0.25 else 0.0
     outline = face.outline(AREAS[trim.area])
     longer, denser = rng.uniform(0.7, 1.3), rng.uniform(0.8, 1.15)
     pieces = [
         _undercoat(face, outline, color, trim.cover * denser, rng),
-        _hairs(face, trim, outline, color, grey, longer, denser, rng),
+        _hairs(face, trim, outline, color + trim.fine * (look.cheek - color), grey, longer, denser, rng),
     ]
-    return worn_mesh((Material("worn beard", tuple(color.tolist()), label=BEARD, gloss=GLOSS), join(pieces)))
+    return worn_mesh((Material("worn beard", tuple(color.tolist()), label=BEARD), join(pieces)))
 
 
 def _undercoat(
@@ -77,7 +80,7 @@ def _undercoat(
     angles, there = GRID, np.isfinite(face.surface).all(axis=-1)
     grows = within(angles, outline) & there & ~face.on_lips(np.where(there[..., None], face.surface, 0), 1.05)
     share = np.clip(gaussian_filter(grows.astype(float), 2.0) * 2 - 0.75, 0, 1) * grows
-    share *= 1 + 0.25 * np.clip(rng.normal(size=share.shape), -1.5, 1.5)
+    share *= 1 + 0.1 * np.clip(rng.normal(size=share.shape), -1.5, 1.5)
     used = grows[:-1, :-1] & grows[1:, :-1] & grows[1:, 1:] & grows[:-1, 1:]
     number = np.arange(TURNS * RISES).reshape(TURNS, RISES)
     a, b, c, d = (part[used] for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
@@ -112,7 +115,7 @@ def _hairs(
     denser: float,
     rng: np.random.Generator,
 ) -> Piece:
-    angles = _roots(face, outline, trim.hairs * denser / 1000, rng)
+    angles = _roots(face, outline, trim.hairs * denser / 1000, trim.ragged, rng)
     angles = angles[: MOST_TRIANGLES // (2 * trim.points - 3)]
     roots, normals = face.place(angles), face.normal(angles)
     count, scale = len(roots), face.scale
@@ -139,7 +142,8 @@ def _hairs(
         0.07 * np.sin(4 * along + rng.uniform(0, 6.3, (count, 1, 1))) * rng.normal(size=(count, 1, 3)) * along
     )
     shape = along * (way + sway)
-    roots = roots + 0.2 * scale * normals
+    # Stubble is too short to come out of the undercoat by itself.
+    roots = roots + (0.7 if trim.points == 2 else 0.2) * scale * normals
     size = _off_lips(face, roots, shape, size)
     kept = size > 0.35 * trim.length * scale * (0.1 if trim.points > 4 else 0.35)
     paths = roots[kept, None] + size[kept, None, None] * shape[kept]
@@ -154,7 +158,9 @@ def _hairs(
     return strips(paths, sides, widths, colors, 1 + rng.normal(0, 0.12, (kept.sum(), 2)))
 
 
-def _roots(face: LowerFace, outline: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+def _roots(
+    face: LowerFace, outline: np.ndarray, density: float, ragged: float, rng: np.random.Generator
+) -> np.ndarray:
     """Azimuth and elevation [N, 2] of hairs, evenly over the skin of an area. density: a square mm."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     tries = 26_000
@@ -167,7 +173,7 @@ def _roots(face: LowerFace, outline: np.ndarray, density: float, rng: np.random.
     area = reach**2 * np.cos(angles[:, 1]) * np.prod(high - low) / tries / np.maximum(facing, 0.25)
     kept = within(angles, outline) & np.isfinite(reach)
     chance = density * np.where(kept, area, 0)
-    soft = within(angles + rng.normal(0, 0.035, angles.shape), outline)
+    soft = within(angles + rng.normal(0, np.radians(ragged), angles.shape), outline)
     kept &= soft & (rng.uniform(size=tries) < chance / max(1.0, np.quantile(chance[kept], 0.95)))
     angles = angles[kept]
     return angles[~face.on_lips(face.place(angles), 1.04)]

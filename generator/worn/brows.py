@@ -25,7 +25,6 @@ HAIRS = {"natural": 190, "thin": 110, "thick": 330}
 LASHES, UNDER_LASHES = 26, 15
 """Of each lid."""
 
-GLOSS = 0.15
 FORWARD = np.array([0.0, 0.0, 1.0])
 
 
@@ -46,7 +45,7 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
             _brow(bald, side, scale, round(count * rng.uniform(0.85, 1.15)), long, wide, color, rng)
         )
         pieces += _lashes(bald, side, scale, 0.5 * color, rng.uniform(0.7, 1.1), rng)
-    material = Material("worn brows", tuple(color.tolist()), label=BROWS, gloss=GLOSS)
+    material = Material("worn brows", tuple(color.tolist()), label=BROWS)
     return worn_mesh((material, join(pieces)))
 
 

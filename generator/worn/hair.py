@@ -15,11 +15,13 @@ from generator.worn.cuts import Cut, draw_cut
 from generator.worn.fit import CannotWear, Fit, Kind
 from generator.worn.gathered import gathered
 from generator.worn.growing import Level, Locks, grow, smooth
-from generator.worn.skull import Skull, find_skull, is_hair
+from generator.worn.skull import TURN, Skull, find_skull, is_hair
 from generator.worn.strips import Piece, across, join, strips, worn_mesh
 from generator.worn.under import Rim
 
-GLOSS = 0.3
+RECEDES = 0.35
+"""How often short hair leaves the temples bare."""
+
 COVERS = ("headscarf", "hijab", "balaclava")
 """Headwear that leaves no hair to be seen."""
 
@@ -43,7 +45,11 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
         raise CannotWear("the head has long hair of its own")
     skull = find_skull(fit)
     cut = draw_cut(style, rng)
-    color = hair_color(complexion(fit), rng)
+    look = complexion(fit)
+    color = hair_color(look, rng)
+    receding = rng.uniform(0, 8) if cut.hides_little and rng.random() < RECEDES else 0.0
+    if not look.painted:
+        skull = replace(skull, line=skull.line + _receded(rng.uniform(-1.5, 2.5), receding))
     rim = None if headwear == NOTHING else Rim(fit, skull)
     if rim is not None:
         # What is gathered, is gathered below the rim.
@@ -57,7 +63,16 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     pieces.append(_strips(skull, cut, locks, color, rng))
     if cut.comb == "gather":
         pieces.append(_strips(skull, cut, gathered(skull, cut, rng), color, rng))
-    return worn_mesh((Material("worn hair", tuple(color.tolist()), label=HAIR, gloss=GLOSS), join(pieces)))
+    return worn_mesh(
+        (Material("worn hair", tuple(color.tolist()), label=HAIR, gloss=cut.gloss), join(pieces))
+    )
+
+
+def _receded(front: float, temples: float) -> np.ndarray:
+    """How much higher than usual a hairline is in front and at the temples, degrees -> radians, [TURNS]."""
+    around = np.abs(np.degrees(TURN))
+    there = smooth(52, 30, around)
+    return np.radians(front * there + temples * there * smooth(6, 26, around))
 
 
 def _undercoat(

@@ -77,7 +77,7 @@ class Skull:
 
     def hairline(self, turn: np.ndarray) -> np.ndarray:
         """Elevation of the hairline, radians, at azimuths."""
-        return np.interp(turn, _TURN, self.line)
+        return np.interp(turn, TURN, self.line)
 
     @cached_property
     def _normals(self) -> np.ndarray:
@@ -92,9 +92,11 @@ class Skull:
         return np.moveaxis(normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9), 2, 0)
 
 
-_TURN = np.linspace(-np.pi, np.pi, TURNS)
+TURN = np.linspace(-np.pi, np.pi, TURNS)
+"""Azimuths of the samples, radians."""
+
 _RISE = np.linspace(-np.pi / 2, np.pi / 2, RISES)
-_GRID = np.meshgrid(_TURN, _RISE, indexing="ij")
+_GRID = np.meshgrid(TURN, _RISE, indexing="ij")
 
 
 def find_skull(fit: Fit) -> Skull:
@@ -114,7 +116,7 @@ def find_skull(fit: Fit) -> Skull:
     reach = _reach(fit, centre, fit.at(152)[0, 1] - 25 * scale)
     ears = _find_ears(fit, scale)
     bare = _without_ears(reach, centre, ears, scale)
-    full = np.maximum(maximum_filter(reach, size=3, mode="nearest"), bare)
+    full = np.maximum(maximum_filter(reach, size=5, mode="nearest"), bare)
     return Skull(centre, scale, full, bare, ears, _hairline(fit, centre, ears, scale))
 
 
@@ -147,7 +149,7 @@ def _reach(fit: Fit, centre: np.ndarray, lowest: float) -> np.ndarray:
     widest = RISES // 2 - 4
     flat = reach * np.cos(_RISE)
     narrowing = np.minimum.accumulate(flat[:, widest::-1], axis=1)[:, ::-1]
-    beside = np.abs(_TURN) > np.radians(75)
+    beside = np.abs(TURN) > np.radians(75)
     reach[beside, : widest + 1] = (narrowing / np.maximum(np.cos(_RISE[: widest + 1]), 0.05))[beside]
     return reach
 
@@ -186,7 +188,7 @@ def _without_ears(full: np.ndarray, centre: np.ndarray, ears: Ears, scale: float
     for column in range(RISES):
         gone = ear[:, column]
         if gone.any() and not gone.all():
-            bare[gone, column] = np.interp(_TURN[gone], _TURN[~gone], bare[~gone, column])
+            bare[gone, column] = np.interp(TURN[gone], TURN[~gone], bare[~gone, column])
     return bare
 
 
@@ -220,8 +222,8 @@ def _hairline(fit: Fit, centre: np.ndarray, ears: Ears, scale: float) -> np.ndar
         for k in range(1, len(turn)):
             turn[k] = max(turn[k], turn[k - 1] + 0.02)
         turn *= np.pi / turn[-1] if turn[-1] > np.pi else 1.0
-        sides.append(PchipInterpolator(turn, rise)(np.abs(_TURN)))
-    return np.where(_TURN < 0, sides[0], sides[1])
+        sides.append(PchipInterpolator(turn, rise)(np.abs(TURN)))
+    return np.where(TURN < 0, sides[0], sides[1])
 
 
 def without_hair(fit: Fit) -> Fit:

@@ -113,13 +113,19 @@ class Torso:
 
     def skin(self, look: Complexion, down: float) -> Piece:
         """The neck from inside the head's own to so many mm below the height of the collar."""
-        start = self.end + 14 * self.scale
+        start = self.end + 16 * self.scale
         foot = self.chin + self.scale * (_collar_heights() - down) + self.raised
         rows = np.linspace(0, 1, 15)[:, None]
         height = start + (np.minimum(foot, self.end - 12 * self.scale) - start) * rows
-        # Within the head's own neck it is a little narrower, and comes out where that ends.
-        inside = np.clip((height - self.end + 3 * self.scale) / (10 * self.scale), 0, 1)
-        reach = self.neck_reach(height) - 2.2 * self.scale * inside
+        # From within the head's own neck it comes out before that ends, and covers its edge.
+        inside = np.clip((height - self.end - 5 * self.scale) / (9 * self.scale), 0, 1)
+        reach = self.neck_reach(height) + self.scale * (0.8 - 3.0 * inside)
+        own = self.own(height)
+        # Where the head has a body of its own, nothing of this is to be seen.
+        shoulders = (own > 0.9 * reach) & (height < self.end - 4 * self.scale) & (self.raised > 1)
+        collar = self.chin + self.scale * (_collar_heights() - 4) + self.raised
+        shoulders |= (own > 0) & (self.own(collar[None]) > 0.85 * self.neck_reach(collar[None]))
+        reach = np.where(shoulders, np.minimum(reach, own - 1.5 * self.scale), reach)
         points = self.points(reach, height)
         tone = self._tones(look)
         colors = np.broadcast_to(tone, points.shape)
@@ -171,7 +177,9 @@ def _with_neck(torso: Torso) -> Torso:
     narrowest, last = np.full(COLUMNS, np.inf), np.full(COLUMNS, -1)
     ended, flares = np.zeros(COLUMNS, dtype=bool), np.zeros(COLUMNS, dtype=bool)
     for row, reach in enumerate(own):
-        there = reach > 0.5 * usual
+        # A sheet that closes a neck from below is no neck.
+        closes = (reach < 0.88 * own[max(row - 1, 0)]) & (own[min(row + 3, len(own) - 1)] < 0.5 * usual)
+        there = (reach > 0.5 * usual) & ~closes
         narrowest = np.where(there & ~ended, np.minimum(narrowest, reach), narrowest)
         wide = np.maximum(1.5 * narrowest, 1.25 * usual)
         flares |= ~ended & (narrowest < 1.35 * usual) & (reach > wide)

@@ -46,7 +46,7 @@ def test_distributions_of_numbers_are_a_line_of_text() -> None:
     ("line", "said"),
     [
         ("lens_mm", "render.lens_mm: Input should be a valid number"),
-        ("lens=uniform:1,2", "render.lens: no such setting; there is lens_mm"),
+        ("lens=uniform:1,2", "render.lens: no such setting; there is lens"),
         ("ambient='uniform:0,1", "render.ambient"),
         ("ambient=uniform:1,0", "the low end 1 is above the high end 0"),
         ("background=red;0;0", "render.background.0: Input should be a valid number"),

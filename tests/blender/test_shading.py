@@ -90,9 +90,8 @@ def spot(gloss: float, lamp: np.ndarray) -> np.ndarray:
     facing = (normal * view).sum(-1)
     mirrored = 2 * facing[..., None] * normal - view
     sharp = 1 / (2 * (1 - gloss) ** 4 + LAMP_WIDTH)
-    k = (1 - gloss) ** 2 / 2
-    share = (FACING + (1 - FACING) * (1 - facing) ** 5) * facing / (facing * (1 - k) + k)
-    return share * sharp / 2 * np.exp(sharp * (mirrored @ lamp - 1))
+    fresnel = FACING + (max(gloss**3, FACING) - FACING) * (1 - facing) ** 5
+    return fresnel * sharp / 2 * np.exp(sharp * (mirrored @ lamp - 1))
 
 
 def half_lambert(look: Look) -> np.ndarray:

@@ -125,6 +125,7 @@ def test_every_setting_has_an_option_and_no_two_share_one_by_accident() -> None:
         "--seed": ["heads.seed", "poses.seed"],
         "--poses": ["poses.kind", "poses.count", "poses.path"],
         "--light": ["render.light_yaw_deg", "render.light_pitch_deg"],
+        **{f"--lamp{k}": [f"render.lamp{k}_yaw_deg", f"render.lamp{k}_pitch_deg"] for k in (1, 2, 3)},
     }
     names = [flag.removeprefix("--") for flag in FLAGS]
     assert len(set(names)) == len(names) and all(name.replace("-", "").isalnum() for name in names)

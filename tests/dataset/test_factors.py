@@ -46,6 +46,8 @@ def test_quarters_of_a_distribution_are_as_likely(name: str) -> None:
 def test_choices_are_told_one_by_one() -> None:
     found = factors(**DRAWN)
     assert found["jpeg"].parts.names == ("50", "80", "90")
+    assert found["jpeg"].drawn_from == "choice: 50 ×2, 80, 90"
+    assert found["ambient"].drawn_from == "head:uniform:0.2,0.6"
     assert found["jpeg"].parts.place(np.array([79.9999, 50, 90])).tolist() == [1, 0, 2]
     backdrop = found["backdrop"].parts
     assert backdrop.place(np.array(["noise", "", "plain"], object)).tolist() == [1, -1, 0]

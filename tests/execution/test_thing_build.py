@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's own thing in a dataset: seen, recorded, verified, replayed; a bad one stops before it begins."""
+"""A user's own thing in a dataset: seen, recorded, verified, replayed; a bad one stops before anything."""
 
 from __future__ import annotations
 

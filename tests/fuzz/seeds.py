@@ -28,6 +28,11 @@ sys.path[:0] = [
 
 RAW, EDITS = b"\0", b"\xff"
 
+PREDICTIONS = (
+    b"sample_id,yaw_deg,pitch_deg,roll_deg\n"
+    b"s1/neutral/y+0_p+0_r+0,1.5,-2,0\ns1/neutral/y+0_p+0_r+0~light,,,\n"
+)
+
 
 def main() -> None:
     """Write every seed into its target's folder."""
@@ -83,6 +88,8 @@ def dataset_seeds() -> Iterator[tuple[str, bytes]]:
             yield name, RAW + small.getvalue()
         yield "poses", (root / "poses.csv").read_bytes()
         yield "poses", b"yaw,pitch,roll\n0,0,0\n10.5,-3,2\n"
+        yield "predictions", PREDICTIONS
+        yield "predictions", PREDICTIONS.replace(b"sample_id", b"input").replace(b"_r+0,", b"_r+0.png,")
         receipt = {"part": asdict(built.parts[0]), "stamp": [1, 2, "0" * 64]}
         yield "receipts", RAW + sealed_line(receipt).encode() + b"\n"
     placement = Placement("cm", 10.0, "+Y", "+Z", (0.0, 1.0, 2.0), 100.0, 90.0)

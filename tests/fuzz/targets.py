@@ -262,6 +262,14 @@ def poses(data: bytes) -> None:
         csv_plan(file)
 
 
+@target(words="sample_id input yaw_deg pitch_deg roll_deg nan s1/neutral/y+0_p+0_r+0~light")
+def predictions(data: bytes) -> None:
+    """Of a model, as CSV; as Parquet they are read as the tables of a dataset are."""
+    from generator.dataset.ablate.predictions import read_predictions
+
+    read_predictions(folder_with(predictions__csv=data) / "predictions.csv").of(["s1/neutral/y+0_p+0_r+0"])
+
+
 @target(words="unit quarantined seconds attempts NaN")
 def build_log(data: bytes) -> None:
     """What the report takes of build.log: a log may end anywhere, so nothing is raised."""

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 
 from generator.dataset.format.files import one_line
-from generator.dataset.format.parquet import read_table
+from generator.dataset.format.parquet import iter_batches, open_parquet
 from generator.errors import UsageError
 from generator.escape import quoted
 from generator.plan.poses import ANGLES
@@ -21,6 +21,7 @@ NAME, FILE = "sample_id", "input"
 """A row is named by its sample_id, or by the path of its image file, as `downstream-hpe predict` does."""
 
 MAX_BYTES = 1 << 30
+ROWS_AT_ONCE = 1 << 16
 
 
 class Predictions:
@@ -47,7 +48,7 @@ def read_predictions(path: Path) -> Predictions:
     """
     try:
         check_regular(path, MAX_BYTES)
-        table = read_table(path) if path.suffix.lower() == ".parquet" else pa_csv.read_csv(path)
+        table = _read_parquet(path) if path.suffix.lower() == ".parquet" else pa_csv.read_csv(path)
         name = NAME if NAME in table.column_names else FILE
         columns = [name, *(f"{angle}_deg" for angle in ANGLES)]
         if lost := [column for column in columns if column not in table.column_names]:
@@ -69,3 +70,9 @@ def read_predictions(path: Path) -> Predictions:
             raise UsageError(f"{path}: {quoted(key)} stands in it twice; give one line an image")
         found[key] = tuple(np.nan if a is None else float(a) for a in (yaw, pitch, roll))  # type: ignore[assignment]
     return Predictions(path, found)
+
+
+def _read_parquet(path: Path) -> pa.Table:
+    with open_parquet(path) as file:
+        schema = file.schema_arrow
+    return pa.Table.from_batches(iter_batches(path, ROWS_AT_ONCE), schema)

@@ -96,7 +96,7 @@ def variety_text(configuration: Mapping[str, Any]) -> list[str]:
     rows = [
         (
             factor.name,
-            markdown_code(factor.distribution.text),
+            markdown_code(factor.drawn_from),
             factor.setting.info.unit,
             "head" if factor.distribution.per_head else "image",
             factor.setting.info.help,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from generator.plan.config import drawn_in
-from generator.plan.distribution import Distribution
+from generator.plan.distribution import PER_HEAD, Distribution
 from generator.plan.setting import Setting
 from generator.plan.settings import all_settings
 
@@ -67,6 +68,16 @@ class Factor:
         if self.place is None:
             return self.setting.key
         return f"{self.setting.key}, {NUMBERS.get(self.setting.key, range(1, 99))[self.place]}"
+
+    @property
+    def drawn_from(self) -> str:
+        """Its distribution, for people: what is chosen several times is said once, with how often."""
+        distribution = self.distribution
+        if distribution.kind != "choice":
+            return distribution.text
+        times = Counter(distribution.texts or map(shown, distribution.numbers))
+        choices = ", ".join(name if n == 1 else f"{name} ×{n}" for name, n in times.items())
+        return f"{PER_HEAD if distribution.per_head else ''}choice: {choices}"
 
     @property
     def narrow(self) -> Bins:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Formats of exports and passes as tables for people: in docs/exports.md and docs/passes.md."""
+"""Formats of exports, passes and factors as tables for people, in docs/."""
 
 from __future__ import annotations
 
 from generator.dataset.export.options import Format
 from generator.dataset.format.missing import MISSING
 from generator.dataset.show.column_tables import markdown_table
+from generator.plan.factors import FACTORS
 from generator.plan.passes import Pass
 from generator.registries import FORMATS, PASSES
 
@@ -43,6 +44,17 @@ def passes_table() -> str:
     known: list[Pass] = [PASSES.get(name) for name in PASSES]
     rows = [(f"`{one.name}`", " ".join(one.channels), one.meaning) for one in known]
     return markdown_table(("layer", "channels", "meaning"), rows)
+
+
+def factors_table() -> str:
+    """What twins may change, and what they draw."""
+    rows = []
+    for factor in FACTORS.values():
+        drawn = [f"`{key}` {text}" for key, text in {**factor.draws, **factor.along}.items() if text]
+        others = [f"`{key}`" for key, text in factor.draws.items() if not text]
+        changes = f"; where the configuration draws it, {', '.join(others)}" if others else ""
+        rows.append((f"`{factor.name}`", factor.meaning, ", ".join(drawn) + changes))
+    return markdown_table(("factor", "what changes", "drawn from"), rows)
 
 
 def _all_or_named(names: list[str]) -> str:

@@ -111,7 +111,7 @@ def _words(factor: Factor) -> dict[str, Any]:
         "name": factor.name,
         "unit": factor.setting.info.unit,
         "help": factor.setting.info.help,
-        "drawn": factor.distribution.text,
+        "drawn": factor.drawn_from,
         "whose": "head" if factor.distribution.per_head else "image",
     }
 
