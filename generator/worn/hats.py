@@ -118,7 +118,7 @@ def brimmed(face: Face, rng: np.random.Generator, over: float) -> list[Part]:
     inside = np.stack(
         [np.interp(high[:, k], points[:, k, 1], level[:, k]) for k in range(72)], axis=1
     )  # of the head at these heights
-    wide = np.maximum(widest * (1 - 0.15 * share**1.7)[:, None], inside + 2.0)
+    wide = np.maximum(widest * (1 - 0.21 * share**2.2)[:, None], inside + 2.0)
     wide = smoothed(wide, (0.7, 1.5), around=True)
     ring = np.stack(
         [

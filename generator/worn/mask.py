@@ -160,6 +160,8 @@ def _loop(face: Face, side: int, top: np.ndarray, low: np.ndarray) -> Shape:
             [ear.bottom + 4.0, middle + 11.0],
         ]
     )
+    if not ear.found:  # straight back, under the hair that hides it
+        way[:, 0] = np.linspace(top[1], low[1], 5)
     flat = curve(np.vstack([top[1:], way, low[1:]]), 34)
     share = np.linspace(0, 1, len(flat))
     on_skin = skull.at(flat[:, 0], flat[:, 1]) + 1.0
