@@ -90,13 +90,13 @@ def _attachment(said: Any) -> Attachment:
     if not isinstance(said, dict):
         raise ValueError("expected an object with label and points")
     if unknown := sorted(set(said) - _KEYS):
-        raise ValueError(f"no {quoted(unknown[0])} is known; there are {', '.join(sorted(_KEYS))}")
+        raise ValueError(f"no {shown(unknown[0])} is known; there are {', '.join(sorted(_KEYS))}")
     label = said.get("label")
     if label not in LABELS:
-        raise ValueError(f"label is {quoted(str(label))}; expected one of {', '.join(LABELS)}")
+        raise ValueError(f"label is {shown(label)}; expected one of {', '.join(LABELS)}")
     units = said.get("units")
-    if units is not None and units not in MM_PER_UNIT:
-        raise ValueError(f"units are {quoted(str(units))}; expected one of {', '.join(MM_PER_UNIT)}, or none")
+    if units is not None and units not in [*MM_PER_UNIT]:
+        raise ValueError(f"units are {shown(units)}; expected one of {', '.join(MM_PER_UNIT)}, or none")
     points = said.get("points")
     if not isinstance(points, list) or not FEWEST <= len(points) <= MAX_POINTS:
         count = len(points) if isinstance(points, list) else "no"

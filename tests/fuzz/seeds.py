@@ -125,6 +125,9 @@ def head_seeds() -> Iterator[tuple[str, bytes]]:
     card = {"license": "CC0-1.0", "redistributable": True, "units": "cm", "up": "+Y", "forward": "+Z"}
     card |= {"subject": "s1", "attribution": "A. Person", "expressions": {"neutral": {"file": "head.obj"}}}
     yield "head_json", RAW + json.dumps(card).encode()
+    points = [{"landmark": k, "point": [k, k * k, 0.5]} for k in range(4)]
+    worn = {"label": "headwear", "units": "cm", "points": points, "opacity": 0.5, "gloss": 0.1}
+    yield "thing", RAW + json.dumps(worn).encode()
     yield "obj", _OBJ.encode()
     yield "obj", b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvn 0 0 1\nf -3//1 -2//1 -1//1\n"
     yield "mtl", _MTL.encode() + b"map_d -s 1 1 1 a.png\n"

@@ -349,6 +349,14 @@ def head_json(data: bytes) -> None:
     find_heads(folder_with(s1___head__json=as_json("head_json", data), s1___head__obj=_OBJ, s1___a__png=b""))
 
 
+@target(words='"label" "points" "landmark" "point" "units" "opacity" "gloss" "headwear" "cm" null true 1e309')
+def thing(data: bytes) -> None:
+    """What is said beside the mesh of a user's own thing."""
+    from generator.plan.thing import content
+
+    content(folder_with(hat__json=as_json("thing", data), hat__obj=_OBJ) / "hat.obj")
+
+
 @target(weight=3, words="v vt vn f o g s usemtl mtllib head.mtl 1/1/1 -1 1e309 nan 999999999 #")
 def obj(data: bytes) -> None:
     """OBJ."""
