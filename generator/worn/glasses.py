@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from generator.heads.mesh import HeadMesh, Material
@@ -33,6 +35,9 @@ OVER_MASK_MM = 3.0
 
 GAPS_MM = (16.0, 18.0, 20.0, 22.0, 24.0, 26.0)
 """Widths of a bridge, of which the one is chosen that sits best."""
+
+UP_MM = (0.0, 3.0, 5.5)
+"""By how much glasses stand higher, tried in this order."""
 
 TINTS: dict[Colour, float] = {
     (0.42, 0.30, 0.22): 3, (0.32, 0.33, 0.35): 3, (0.62, 0.50, 0.22): 1, (0.55, 0.32, 0.36): 1,
@@ -100,8 +105,8 @@ def seat(face: Face, frame: Frame, size: float, over: float = 0.0) -> tuple[Fron
     """Where a frame's front stands, and the outline of its lens at image right about the front's middle.
 
     over: mm that it stands farther from the face, such as over a mask.
-    The bridge is chosen that lets the lenses stand nearest to the eyes. Raises CannotWear where even so they
-    are too far.
+    The bridge is chosen that lets the lenses stand nearest to the eyes; over raised cheeks they stand higher.
+    Raises CannotWear where even so they are too far.
     """
     (nose,) = face.at(NASION)
     right, left = face.pupil(-1), face.pupil(1)
@@ -111,25 +116,28 @@ def seat(face: Face, frame: Frame, size: float, over: float = 0.0) -> tuple[Fron
     eyes = face.front(np.array([right[0], left[0]]), np.array([right[1], left[1]]))
     if not np.isfinite(eyes).all():
         raise CannotWear("no eye is found for glasses to stand before")
-    best: tuple[float, float, np.ndarray] | None = None
-    for gap in GAPS_MM:
+    best: tuple[float, float, np.ndarray, np.ndarray] | None = None
+    for up, gap in product(UP_MM, GAPS_MM):
+        if up and best is not None and best[1] - eyes.max() <= MOST_VERTEX_MM:
+            break
+        place = middle + np.array([0.0, up, 0.0])
         gap *= face.scale
         # A lens is wider on a wide nose, too, and its middle farther out.
         centre = apart / 2 + (2.0 + frame.widen_mm / 2) * face.scale + 0.25 * (gap - GAPS_MM[0])
         shape = frame.points(2 * centre * size - gap)
         low = shape[:, 1].min()
         outline = shape + np.array([gap / 2 - shape[:, 0].min(), -0.08 * (shape[:, 1].max() - low)])
-        front = Front(middle)
+        front = Front(place)
         behind = front.at(outline.mean(axis=0))[2]
         needed = max(_needed(face, front, outline, frame) + over, eyes.max() + VERTEX_MM - behind)
         cost = needed + 0.25 * abs(gap - 18.0)
         if best is None or cost < best[0]:
-            best = cost, needed, outline
+            best = cost, needed, outline, place
     assert best is not None, "there are widths"
-    _, depth, outline = best
+    _, depth, outline, place = best
     if depth - eyes.max() > MOST_VERTEX_MM:
         raise CannotWear(f"glasses would stand {depth - eyes.max():.0f} mm before the eyes")
-    return Front(middle + np.array([0, 0, depth])), outline
+    return Front(place + np.array([0, 0, depth])), outline
 
 
 def _needed(face: Face, front: Front, outline: np.ndarray, frame: Frame) -> float:
