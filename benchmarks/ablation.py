@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What eight factors do to the detector and its rigid fit: builds rows with twins, prints a table.
 
-    python benchmarks/ablation.py                         # 60 heads x 6 poses: 360 pairs a factor
+    python benchmarks/ablation.py                         # 60 heads x 8 poses: 480 pairs a factor
     python benchmarks/ablation.py --out DATASET --factors glasses,hair,light,lens
     python benchmarks/ablation.py --out DATASET --predictions MODEL.csv
 
@@ -58,7 +58,7 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, help="the dataset; by default one that is deleted in the end")
     parser.add_argument("--heads", type=int, default=60)
-    parser.add_argument("--poses", type=int, default=6, help="of each head")
+    parser.add_argument("--poses", type=int, default=8, help="of each head")
     parser.add_argument("--factors", default=FACTORS)
     parser.add_argument("--predictions", type=Path, action="append", default=[], help="of models, repeatable")
     given = parser.parse_args()

@@ -133,6 +133,7 @@ class Images:
                 for view, path, things, classes in zip(bare, paths, worn, labels, strict=True):
                     if name != SEGMENTATION.name or there & classes:
                         stage.show(view, None, things)
+                        stage.see_through_all()
                         target = path.with_name(painted_file(path.stem, name, group))
                         _render_again(target, self._box(view, things))
 

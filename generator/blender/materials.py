@@ -10,7 +10,7 @@ import bpy
 from generator.blender.fast_light import GLOSS, LIGHT, FastLight
 from generator.blender.label_group import labels_group
 from generator.blender.needs import Needs
-from generator.blender.nodes import math_node, vector_node
+from generator.blender.nodes import math_node, scaled, vector_node
 from generator.blender.skin import Skin, has_relief, relief, set_relief
 from generator.heads.mesh import Material
 from generator.heads.shine import gloss_of, is_skin
@@ -29,6 +29,12 @@ which turns skin to chrome."""
 
 GLOSSY, LEAST_ROUGHNESS = 0.35, 0.05
 """Specular level of an index of refraction of 1.4; the roughness of what has all gloss."""
+
+DARKEST_SKIN = 0.03
+"""Luminance of the darkest of :data:`generator.heads.parametric.appearance.SKIN_TONES`."""
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Of linear RGB (ITU-R BT.709)."""
 
 CLEAREST = 0.02
 """Opacity of a material that is clearer than that."""
@@ -189,12 +195,23 @@ def _lit_by_normal(
     sent = _times(tree, skin.color, lit.light)
     if lit.shine is not None:
         mirrored = lit.shine
+        if is_skin(material):
+            mirrored = scaled(tree, mirrored, _bareness(tree, skin.color))
         if material.opacity < 1:
             # What is clear mirrors no less: the share that it hides is taken off again below.
             mirrored = _times(tree, mirrored, _value(tree, 1 / max(material.opacity, CLEAREST)))
         sent = vector_node(tree, "ADD", sent, mirrored)
     tree.links.new(sent, emission.inputs["Color"])
     return emission.outputs[0]
+
+
+def _bareness(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """Less than 1 of what is darker than any skin: hair, nostrils and the rims of lids are painted on it."""
+    bright = tree.nodes.new("ShaderNodeVectorMath")
+    bright.operation = "DOT_PRODUCT"
+    tree.links.new(color, bright.inputs[0])
+    bright.inputs[1].default_value = [share / DARKEST_SKIN for share in LUMINANCE]
+    return math_node(tree, "MINIMUM", bright.outputs["Value"], 1.0)
 
 
 def _principled(tree: bpy.types.NodeTree, skin: Skin) -> bpy.types.NodeSocket:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
 from generator.plan.settings import Look
 
@@ -29,9 +29,11 @@ class Needs:
         return cls(environment, occlusion, len(look.lamps), look.gloss > 0, look.skin_detail > 0)
 
     def cover(self, others: Needs) -> bool:
-        """Is there a node for all that others need?"""
-        return all(mine >= other for mine, other in zip(astuple(self), astuple(others), strict=True))
+        """Is there a node for all that others need, and none that changes their pixels? Relief does: a normal
+        that is leaned by nothing and made a unit again has other digits."""
+        more = all(mine >= other for mine, other in zip(astuple(self), astuple(others), strict=True))
+        return more and self.relief == others.relief
 
     def __or__(self, others: Needs) -> Needs:
-        """What one or the other needs."""
-        return Needs(*map(max, astuple(self), astuple(others)))
+        """What one or the other needs; the relief of the first."""
+        return replace(Needs(*map(max, astuple(self), astuple(others))), relief=self.relief)

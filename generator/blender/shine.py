@@ -62,11 +62,13 @@ def shine(
         tree.links.new(reverse.outputs[0], cosine.inputs[0])
         exponent = math_node(tree, "MULTIPLY_ADD", cosine.outputs["Value"], sharpness, minus)
         lobe = math_node(tree, "EXPONENT", exponent)
-        spots = vector_node(tree, "MULTIPLY_ADD", lobe, None, spots)
-        spots.node.name = f"{_MIRRORED} colour of {name}"
+        # A product by itself: of black, Cycles leaves out all that comes before it.
+        spot = vector_node(tree, "MULTIPLY", lobe, None)
+        spot.node.name = f"{_MIRRORED} colour of {name}"
+        spots = spot if spots is None else vector_node(tree, "ADD", spots, spot)
     # A lobe of exp(s (cosine - 1)) holds 2 pi / s; a white surface before a lamp of strength 1 gets pi.
     half = math_node(tree, "MULTIPLY", sharpness, 0.5)
-    around = vector_node(tree, "MULTIPLY_ADD", spots, half, None)
+    around = vector_node(tree, "ADD", None, None)
     around.node.name = _MIRRORED
     if environment:
         combined = tree.nodes.new("ShaderNodeCombineXYZ")
@@ -75,11 +77,14 @@ def shine(
             along.operation, along.name = "DOT_PRODUCT", f"{_MIRRORED} {color}"
             tree.links.new(reverse.outputs[0], along.inputs[0])
             tree.links.new(along.outputs["Value"], socket)
-        around = vector_node(tree, "ADD", around, combined.outputs[0])
+        tree.links.new(combined.outputs[0], around.node.inputs[0])
+    # A clear mirror shows a few bright things among many dark ones, and no haze.
+    haze = math_node(tree, "SUBTRACT", 1.0, math_node(tree, "MULTIPLY", gloss, gloss))
+    seen = vector_node(tree, "MULTIPLY_ADD", around, haze, scaled(tree, spots, half))
     mirrored_share = _fresnel(tree, facing.outputs["Value"], gloss)
     if share is not None:
         mirrored_share = math_node(tree, "MULTIPLY", mirrored_share, share)
-    return scaled(tree, around, mirrored_share)
+    return scaled(tree, seen, mirrored_share)
 
 
 def set_lamp(nodes: bpy.types.Nodes, name: str, direction: Sequence[float], color: Sequence[float]) -> None:
@@ -100,7 +105,7 @@ def set_surroundings(
     if environment is not None:
         terms = np.array(environment.terms)
         mean, gradient = mean + terms[0] + (terms[7] + terms[8]) / 3, -LESS_BLURRED * terms[1:4]
-    nodes[_MIRRORED].inputs[2].default_value = mean.tolist()
+    nodes[_MIRRORED].inputs[1].default_value = mean.tolist()
     for color, part in zip("rgb", gradient.T if varied else (), strict=False):
         nodes[f"{_MIRRORED} {color}"].inputs[1].default_value = part.tolist()
 

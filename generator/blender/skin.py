@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import bpy
 
-from generator.blender.nodes import BLACK, math_node, scaled, vector_node
+from generator.blender.nodes import math_node, scaled, vector_node
 
 LONGEST_MM = 2.5
 """Wavelength of the coarsest waves; each octave halves it."""
@@ -20,14 +20,13 @@ LONGEST_MM = 2.5
 MOST_OCTAVES = 3.0
 """Besides the first: down to 0.3 mm, as wide as a pore."""
 
-LEAN = 0.45
+LEAN = 0.25
 """How far a detail of 1 leans normals, over the noise, whose standard deviation is about 0.15."""
 
-SHADE = 0.12
+SHADE = 0.1
 """How much darker the bottom of the relief is, over the noise."""
 
 _NOISE, _LEAN, _SHADE = "relief", "lean of the relief", "shade of the relief"
-_SWITCH = "relief or none"
 
 
 class Skin(NamedTuple):
@@ -52,24 +51,20 @@ def relief(tree: bpy.types.NodeTree, color: bpy.types.NodeSocket) -> Skin:
     smooth = tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
     leaned = vector_node(tree, "MULTIPLY_ADD", centred.outputs[0], None, smooth)
     leaned.node.name = _LEAN
-    # Not all at once: without a detail the normal is the very one that there is without these nodes.
-    change = vector_node(tree, "SUBTRACT", vector_node(tree, "NORMALIZE", leaned), smooth)
-    normal = vector_node(tree, "MULTIPLY_ADD", change, None, smooth)
-    normal.node.name = _SWITCH
+    normal = vector_node(tree, "NORMALIZE", leaned)
     shade = math_node(tree, "MULTIPLY_ADD", noise.outputs["Fac"], 0.0, 1.0)
     shade.node.name = _SHADE
     return Skin(scaled(tree, color, shade), normal)
 
 
 def set_relief(tree: bpy.types.NodeTree, detail: float, pixel_mm: float) -> None:
-    """detail: 0 is smooth, 1 is skin. pixel_mm: what a pixel covers on the head."""
+    """detail: 1 is skin. pixel_mm: what a pixel covers on the head."""
     waves = math.log2(LONGEST_MM / (2 * pixel_mm))
     strength = detail * min(1.0, 2.0 ** min(waves, 0.0))  # what is shorter than two pixels fades
     # Whole octaves: a part of one takes as long as all of it.
     tree.nodes[_NOISE].inputs["Detail"].default_value = float(math.floor(min(max(waves, 0.0), MOST_OCTAVES)))
     lean = LEAN * strength
     tree.nodes[_LEAN].inputs[1].default_value = (lean, lean, lean)
-    tree.nodes[_SWITCH].inputs[1].default_value = (1.0, 1.0, 1.0) if lean else BLACK
     shade = SHADE * strength
     tree.nodes[_SHADE].inputs[1].default_value = shade
     tree.nodes[_SHADE].inputs[2].default_value = 1.0 - shade / 2

@@ -30,6 +30,9 @@ METRES = 1e-3
 
 QUALITY_BOUNCES = 2
 
+TRANSPARENT_LAYERS = 8
+"""Through which a ray goes."""
+
 
 class Stage:
     """A head, its light and its camera in an empty scene.
@@ -86,6 +89,10 @@ class Stage:
         if not self.fits(view.look, environment is not None):
             raise ValueError(f"a stage for {self._kind} cannot show {_kind(view.look)}")
         turn(self.head, view.pose)
+        if worn:
+            self.see_through_all()
+        else:
+            self.scene.cycles.min_transparent_bounces = 0
         offsets = {one.package: one.offset_mm for one in worn}
         for package, thing in self._worn.items():
             set_seen(thing, package in offsets)
@@ -101,6 +108,10 @@ class Stage:
         if lit != self._lit:
             self._light.set(*lit)
             self._lit = lit
+
+    def see_through_all(self) -> None:
+        """Leave nothing to chance of what is seen through several layers; a head alone always did."""
+        self.scene.cycles.min_transparent_bounces = TRANSPARENT_LAYERS
 
     def hang(self, worn: Mapping[str, HeadMesh]) -> None:
         """Have these things at hand, by their package, and no others."""
@@ -244,7 +255,7 @@ def _set_render(scene: bpy.types.Scene, look: Look, threads: int) -> None:
     bounces = 0 if look.preset == "fast" else QUALITY_BOUNCES
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.transmission_bounces = cycles.volume_bounces = 0
-    cycles.transparent_max_bounces = 8
+    cycles.transparent_max_bounces = TRANSPARENT_LAYERS
     cycles.caustics_reflective = cycles.caustics_refractive = False
 
     view = scene.view_settings

@@ -62,11 +62,12 @@ def openness(mesh: HeadMesh, surface: Surface) -> np.ndarray:
     normals, _ = vertex_normals(points, mesh.triangles)
     found = np.empty(count)
     for start in range(0, count, BATCH):
-        some = slice(start, min(start + BATCH, count))
-        found[some] = _open_share(surface, points[some], normals[some], rays, start)
-    # A sheet, such as hair that hangs, has two sides and one value: the one that is more open.
-    dark = np.flatnonzero(found < SHEET)
-    found[dark] = np.maximum(found[dark], _open_share(surface, points[dark], -normals[dark], rays, 0))
+        some = np.arange(start, min(start + BATCH, count))
+        found[some] = _open_share(surface, points[some], normals[some], rays, some)
+        # A sheet, such as hair that hangs, has two sides and one value: the one that is more open.
+        some = some[found[some] < SHEET]
+        behind = _open_share(surface, points[some], -normals[some], rays, some)
+        found[some] = np.maximum(found[some], behind)
     average = _averaging(mesh)
     for _ in range(max(1, round(np.log2(AVERAGED / rays)))):
         found = average @ found
@@ -74,11 +75,11 @@ def openness(mesh: HeadMesh, surface: Surface) -> np.ndarray:
 
 
 def _open_share(
-    surface: Surface, points: np.ndarray, normals: np.ndarray, rays: int, first: int
+    surface: Surface, points: np.ndarray, normals: np.ndarray, rays: int, numbers: np.ndarray
 ) -> np.ndarray:
-    """Share of rays from points [N, 3] about normals [N, 3] that meet nothing. first: number of the first."""
+    """Share of rays from points [N, 3] about normals [N, 3] that meet nothing. numbers: of the points."""
     # Even on the unit disc, and lifted onto the hemisphere: weighted by the cosine (Malley's method).
-    turn = ((first + np.arange(len(points))) * 0.6180339887 % 1 * 2 * np.pi)[:, None]
+    turn = (numbers * 0.6180339887 % 1 * 2 * np.pi)[:, None]
     ray = np.arange(rays)
     radius = np.sqrt((ray + 0.5) / rays)
     angle = ray * _GOLDEN_ANGLE + turn

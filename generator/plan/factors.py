@@ -95,10 +95,11 @@ _EVERY = (
     Factor("jpeg", "a JPEG of lower quality", {"jpeg": "uniform:10,60"}),
     Factor(
         "skin",
-        "skin that shines, and shade in sockets and nostrils",
-        {"gloss": "uniform:0.3,0.8", "occlusion": "uniform:0.5,1"},
+        "skin that shines and has pores and furrows, and shade in sockets and nostrils",
+        {"gloss": "uniform:0.3,0.8", "occlusion": "uniform:0.5,1", "skin_detail": "uniform:0.5,1.5"},
     ),
     *map(_worn, STYLES),
+    Factor("thing", "one of your own things", {"thing": ""}, worn=True),
 )
 
 FACTORS: dict[str, Factor] = {factor.name: factor for factor in _EVERY}

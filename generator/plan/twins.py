@@ -40,6 +40,11 @@ def twin_factors(config: PlannedTwins) -> tuple[str, ...]:
     factors = tuple(dict.fromkeys(config.dataset.twins))
     if any(FACTORS[name].camera for name in factors) and config.render.projection == "orthographic":
         raise UsageError("dataset.twins: without perspective another lens changes nothing; leave lens out")
+    for factor in (FACTORS[name] for name in factors):
+        given = any(f"render.{key}" in config.drawn for key in factor.draws)
+        if not any(factor.draws.values()) and not given and is_plain(config.render, factor):
+            keys = " or ".join(f"render.{key}" for key in factor.draws)
+            raise UsageError(f"dataset.twins: nothing says which {factor.name} a twin has; give {keys}")
     return factors
 
 

@@ -16,14 +16,17 @@ from generator.worn.strips import Piece, across, join, strips, worn_mesh
 UPPER, LOWER = (70, 63, 105, 66, 107), (46, 53, 52, 65, 55)
 """Landmarks of a brow at image left, from its tail to its head, along its upper and its lower edge."""
 
-LID, UNDER_LID = (33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133)
-"""Landmarks of the margins of the lids of the eye at image left, from the outer to the inner corner."""
+LID = (33, 246, 161, 160, 159, 158, 157, 173, 133)
+"""Landmarks of the upper lid of the eye at image left, from the outer to the inner corner."""
 
-HAIRS = {"natural": 190, "thin": 110, "thick": 330}
+HAIRS = {"natural": 170, "thin": 95, "thick": 250}
 """Of each brow."""
 
-LASHES, UNDER_LASHES = 26, 15
-"""Of each lid."""
+LASHES, LASH_MM = 26, 6.0
+"""Of each eye, and how long."""
+
+THIN = 0.22
+"""Share of the skin's colour in that of a brow's hair."""
 
 FORWARD = np.array([0.0, 0.0, 1.0])
 
@@ -35,16 +38,17 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     scale = float(np.linalg.norm(sides[1] - sides[0])) / UNIT_MM
     if not 0.3 < scale < 3:
         raise CannotWear("its face is not of a head's size")
-    color = 0.85 * natural_hair_color(complexion(bald), rng)
+    look = complexion(bald)
+    color = 0.9 * natural_hair_color(look, rng)
     # Brows of the fair and the grey are darker than their hair.
     color = color * np.clip(1.25 - color.mean(), 0.6, 1.0)
+    # A hair is thinner than it is drawn, and skin shows between.
+    pale = color + THIN * (look.forehead - color)
     count, long, wide = HAIRS[style], rng.uniform(0.85, 1.2), rng.uniform(0.8, 1.2)
     pieces = []
     for side in (-1, 1):
-        pieces.append(
-            _brow(bald, side, scale, round(count * rng.uniform(0.85, 1.15)), long, wide, color, rng)
-        )
-        pieces += _lashes(bald, side, scale, 0.5 * color, rng.uniform(0.7, 1.1), rng)
+        pieces.append(_brow(bald, side, scale, round(count * rng.uniform(0.85, 1.15)), long, wide, pale, rng))
+        pieces.append(_lashes(bald, side, scale, 0.5 * color, rng.uniform(0.35, 1.0), rng))
     material = Material("worn brows", tuple(color.tolist()), label=BROWS)
     return worn_mesh((material, join(pieces)))
 
@@ -72,7 +76,7 @@ def _brow(
     height = (
         0.5
         + (rng.beta(2.2, 2.2, count) - 0.5)
-        * (0.5 + 0.45 * np.sin(np.pi * np.clip(along + 0.25, 0, 1)))
+        * (0.34 + 0.36 * np.sin(np.pi * np.clip(along + 0.25, 0, 1)))
         * wide
     )
     upper, lower = _line(fit, UPPER, side, along), _line(fit, LOWER, side, along)
@@ -96,7 +100,7 @@ def _brow(
     paths = roots[:, None] + steps[:, None] * (size[:, None] * way)[:, None]
     paths = paths + rise[:, None] * (lift[:, None] * normal)[:, None]
     sides = across(paths, np.broadcast_to(normal[:, None], paths.shape), rng.normal(0, 0.3, (count, 1)))
-    widths = scale * rng.uniform(0.55, 0.95, (count, 1)) * np.array([0.7, 1.0, 0.75, 0.0])
+    widths = scale * rng.uniform(0.45, 0.8, (count, 1)) * np.array([0.7, 1.0, 0.75, 0.0])
     shade = rng.normal(1, 0.12, (count, 1, 1))
     colors = np.broadcast_to(color * shade, paths.shape)
     return strips(paths, sides, widths, colors, 1 + rng.normal(0, 0.1, (count, 2)))
@@ -104,33 +108,21 @@ def _brow(
 
 def _lashes(
     fit: Fit, side: int, scale: float, color: np.ndarray, long: float, rng: np.random.Generator
-) -> list[Piece]:
-    pieces = []
-    for places, count, up, size, wide in (
-        (LID, LASHES, 1.0, 6.0, 1.25),
-        (UNDER_LID, UNDER_LASHES, -0.8, 2.5, 0.6),
-    ):
-        share = np.linspace(0.06, 0.94, count) + rng.normal(0, 0.008, count)
-        roots = _line(fit, places, side, share) + 0.25 * scale * FORWARD
-        # Long in the outer half, and fanned out.
-        size_mm = (
-            scale
-            * long
-            * size
-            * (0.55 + 0.45 * np.sin(np.pi * (1 - share) ** 0.8))
-            * rng.uniform(0.8, 1.1, count)
-        )
-        fan = np.stack([side * (0.75 - 1.05 * share), 0 * share, 0 * share], axis=1)
-        out = fan + np.array([0.0, 0.12 * up, 1.0]) + rng.normal(0, 0.06, (count, 3))
-        out /= np.linalg.norm(out, axis=1, keepdims=True)
-        steps = np.array([0.0, 0.5, 1.0])
-        curl = np.array([0.0, 0.12, 0.55]) * up
-        paths = roots[:, None] + steps[:, None] * (size_mm[:, None] * out)[:, None]
-        paths = paths + size_mm[:, None, None] * curl[:, None] * np.array([0.0, 1.0, 0.0])
-        sides = np.broadcast_to(np.array([1.0, 0.0, 0.0]), paths.shape)
-        widths = np.broadcast_to(scale * wide * np.array([1.0, 0.5, 0.0]), (count, 3))
-        pieces.append(strips(paths, sides, widths, np.broadcast_to(color, paths.shape), np.ones((count, 2))))
-    return pieces
+) -> Piece:
+    """Of the upper lid: those of the lower one are thinner than any pixel."""
+    share = np.linspace(0.06, 0.94, LASHES) + rng.normal(0, 0.008, LASHES)
+    roots = _line(fit, LID, side, share) + 0.25 * scale * FORWARD
+    # Long in the outer half, and fanned out.
+    full = 0.55 + 0.45 * np.sin(np.pi * (1 - share) ** 0.8)
+    size = (scale * long * LASH_MM * full * rng.uniform(0.8, 1.1, LASHES))[:, None, None]
+    fan = np.stack([side * (0.75 - 1.05 * share), 0 * share, 0 * share], axis=1)
+    out = fan + np.array([0.0, 0.12, 1.0]) + rng.normal(0, 0.06, (LASHES, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    steps, curl = np.array([0.0, 0.5, 1.0])[:, None], np.array([0.0, 0.12, 0.55])[:, None]
+    paths = roots[:, None] + size * (steps * out[:, None] + curl * np.array([0.0, 1.0, 0.0]))
+    sides = np.broadcast_to(np.array([1.0, 0.0, 0.0]), paths.shape)
+    widths = np.broadcast_to(scale * np.array([1.25, 0.6, 0.0]), (LASHES, 3))
+    return strips(paths, sides, widths, np.broadcast_to(color, paths.shape), np.ones((LASHES, 2)))
 
 
 KIND = Kind(make)

@@ -11,7 +11,7 @@ from generator.worn.fabric import COLORS, SHIRTS, SUITS, folds, pattern, pick
 from generator.worn.strips import Piece
 from generator.worn.torso import ANGLES, COLUMNS, Torso, grid
 
-ROWS = 42
+ROWS = 48
 _FRONT = np.minimum(ANGLES, 2 * np.pi - ANGLES)
 """Angle from the front to either side."""
 
@@ -25,14 +25,14 @@ def crew(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     first = 1 + round(low)
     reach, height, colors = reach[first:], height[first:], colors[first:]
     colors[:2] = color * rng.uniform(0.7, 1.0)
-    return [_edged(torso, reach, height, colors)]
+    return [_body(*_edged(torso, reach, height, colors))]
 
 
 def turtleneck(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     """A pullover whose collar is folded over."""
     color = pick(COLORS, rng)
     reach, height = _cloth(torso, rng, 3.0, 4.0)
-    pieces = [grid(torso.points(reach, height), pattern(reach.shape, rng, color, 0.8))]
+    pieces = [_body(torso.points(reach, height), pattern(reach.shape, rng, color, 0.8))]
     top = height[0] + torso.scale * rng.uniform(24, 34)
     rows = np.linspace(0, 1, 12)[:, None]
     tall = top + (height[2] - top) * rows
@@ -40,7 +40,7 @@ def turtleneck(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     around = torso.body(tall)
     ribs = 0.5 * np.cos(COLUMNS / 2 * ANGLES) * torso.scale
     tube = around + torso.scale * (2.5 + 6.0 * bulge) + ribs * bulge
-    pieces.append(_edged(torso, tube, tall, np.broadcast_to(color * 0.96, (*tube.shape, 3)).copy()))
+    pieces.append(grid(*_edged(torso, tube, tall, np.broadcast_to(color * 0.96, (*tube.shape, 3)))))
     return pieces
 
 
@@ -55,7 +55,7 @@ def hoodie(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     """A pullover with a hood that lies on the back."""
     color = pick(COLORS, rng)
     reach, height = _cloth(torso, rng, 5.0, 6.0)
-    pieces = [grid(torso.points(reach, height), np.broadcast_to(color, (*reach.shape, 3)))]
+    pieces = [_body(torso.points(reach, height), color)]
     turn = np.linspace(0, 2 * np.pi, 15)[:, None]
     # A thick roll around the neck, thin and low in front, thick behind.
     behind = np.sin(_FRONT / 2) ** 1.5
@@ -71,14 +71,14 @@ def hoodie(torso: Torso, rng: np.random.Generator) -> list[Piece]:
 
 def suit(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     """A jacket over a shirt, mostly with a tie."""
-    pieces = _shirt(torso, rng, pick(SHIRTS, rng), 0.03, plain=0.8)
+    pieces = _shirt(torso, rng, pick(SHIRTS, rng), 0.03, plain=0.8, rows=round(0.66 * ROWS))
     color = pick(SUITS, rng)
     reach, height = _cloth(torso, rng, 9.0, 4.0)
     down = np.linspace(0, 1, ROWS)
     # Open in front, from the sides of the neck to the lowest button.
-    opening = np.radians(58) * np.clip(1 - down * 1.35, 0, 1) ** 0.8
+    opening = np.radians(58) * np.clip(1 - down * 1.7, 0, 1) ** 0.8
     points = _from(torso, reach, height, opening)
-    pieces.append(grid(points[2:], np.broadcast_to(color, points[2:].shape), closed=False))
+    pieces.append(_body(points[2:], color, closed=False))
     pieces += _lapels(torso, reach, height, opening, color)
     if rng.random() < 0.8:
         pieces += _tie(torso, rng)
@@ -99,19 +99,30 @@ def _cloth(
     return reach + np.clip(waves, -0.6 * lift * torso.scale, most * torso.scale), height
 
 
-def _edged(torso: Torso, reach: np.ndarray, height: np.ndarray, colors: np.ndarray) -> Piece:
-    """A sheet whose upper edge turns inwards, so that it has a thickness."""
-    inner = np.stack([reach[0] - 5 * torso.scale, reach[0] - 1.2 * torso.scale])
-    above = np.stack([height[0] - 5 * torso.scale, height[0] + 1.6 * torso.scale])
-    dark = np.stack([0.5 * colors[0], 0.9 * colors[0]])
+def _body(points: np.ndarray, colors: np.ndarray, *, closed: bool = True) -> Piece:
+    """The sheet of a garment through points [R, C, 3], with a floor: nobody looks into it from below."""
+    floor = np.broadcast_to(points[-1].mean(axis=0), (1, *points.shape[1:]))
+    colors = np.broadcast_to(colors, points.shape)
     return grid(
-        torso.points(np.concatenate([inner, reach]), np.concatenate([above, height])),
-        np.concatenate([dark, colors]),
+        np.concatenate([points, points[-1:], floor]),
+        np.concatenate([colors, 0.4 * colors[-1:], 0.4 * colors[-1:]]),
+        closed=closed,
     )
 
 
+def _edged(
+    torso: Torso, reach: np.ndarray, height: np.ndarray, colors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points and colours of a sheet whose upper edge turns inwards, so that it has a thickness."""
+    inner = np.stack([reach[0] - 5 * torso.scale, reach[0] - 1.2 * torso.scale])
+    above = np.stack([height[0] - 5 * torso.scale, height[0] + 1.6 * torso.scale])
+    dark = np.stack([0.5 * colors[0], 0.9 * colors[0]])
+    points = torso.points(np.concatenate([inner, reach]), np.concatenate([above, height]))
+    return points, np.concatenate([dark, colors])
+
+
 def _shirt(
-    torso: Torso, rng: np.random.Generator, color: np.ndarray, wide: float, plain: float
+    torso: Torso, rng: np.random.Generator, color: np.ndarray, wide: float, plain: float, rows: int = ROWS
 ) -> list[Piece]:
     scale = torso.scale
     reach, height = _cloth(torso, rng, 1.5, 2.5, 3.0)
@@ -119,9 +130,10 @@ def _shirt(
     # Columns at the front overlap where it is buttoned.
     colors[:, [1, COLUMNS - 2]] *= 0.9
     down = np.linspace(0, 1, ROWS)
-    opening = np.radians(34) * wide * np.clip(1 - down * 4.5, 0, 1)
+    opening = np.radians(34) * wide * np.clip(1 - down * 5.6, 0, 1)
     points = _from(torso, reach, height, opening)
-    pieces = [grid(points, np.concatenate([colors, colors[:, :1]], axis=1), closed=False)]
+    colors = np.concatenate([colors, colors[:, :1]], axis=1)
+    pieces = [_body(points[:rows], colors[:rows], closed=False)]
     # The leaf of the collar: up the neck, then folded outwards and down, its points in front.
     front = np.cos(_FRONT / 2) ** 6
     stand = height[0] + scale * (20 - 12 * front)
@@ -156,7 +168,7 @@ def _lapels(
     torso: Torso, reach: np.ndarray, height: np.ndarray, opening: np.ndarray, color: np.ndarray
 ) -> list[Piece]:
     """A leaf along each edge of a jacket's opening, with a notch."""
-    rows = np.arange(2, int(ROWS * 0.72))
+    rows = np.arange(2, int(ROWS * 0.58))
     share = np.linspace(0, 1, len(rows))
     width = np.radians(17) * np.sin(np.pi * np.clip(0.12 + 0.88 * share, 0, 1)) ** 0.7
     width *= np.where(np.abs(share - 0.3) < 0.035, 0.62, 1.0)
@@ -191,7 +203,7 @@ def _tie(torso: Torso, rng: np.random.Generator) -> list[Piece]:
     color, other = pick(COLORS, rng), pick(COLORS, rng)
     slant = rng.random() < 0.5
     reach, height = torso.surface(ROWS, 5.0)
-    rows = np.arange(0, int(ROWS * 0.9))
+    rows = np.arange(0, int(ROWS * 0.6))
     depth = torso.axis[1] + reach[rows, 0]
     down = np.linspace(0, 1, len(rows))
     knot = np.clip((0.1 - down) / 0.1, 0, 1)

@@ -28,6 +28,7 @@ COVERS = ("headscarf", "hijab", "balaclava")
 LOW_KNOT_DEG = -32.0
 """Elevation of where hair is gathered below a rim."""
 
+EDGE_HAIRS = 520
 COLUMNS, ROWS = 73, 17
 """Of the undercoat."""
 
@@ -61,6 +62,8 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
         locks = Locks(rim.flattened(locks.paths[seen], locks.layer[seen]), locks.layer[seen])
     pieces = [_undercoat(fit, skull, cut, color, rng, flat=rim is not None)]
     pieces.append(_strips(skull, cut, locks, color, rng))
+    if rim is None and cut.points > 2:
+        pieces.append(_edge(skull, cut, color, look.forehead, rng))
     if cut.comb == "gather":
         pieces.append(_strips(skull, cut, gathered(skull, cut, rng), color, rng))
     return worn_mesh(
@@ -107,7 +110,7 @@ def _strips(skull: Skull, cut: Cut, locks: Locks, color: np.ndarray, rng: np.ran
     along = np.linspace(0, 1, points)
     # What lies is flat on the head; what hangs turns every way, or it would be gone seen along it.
     hangs = smooth(10, -20, np.degrees(skull.angles(locks.paths)[1]))
-    roll = rng.normal(0, 0.12, count)[:, None] + hangs * rng.normal(0, 0.9, count)[:, None]
+    roll = rng.normal(0, 0.2, count)[:, None] + hangs * rng.normal(0, 0.65, count)[:, None]
     sides = across(locks.paths, normals, roll)
     profile = np.minimum(0.55 + 1.6 * along, 1.0) * (1 - 0.55 * along**2)
     widths = cut.width * skull.scale * rng.uniform(0.6, 1.35, count)[:, None] * profile
@@ -118,6 +121,24 @@ def _strips(skull: Skull, cut: Cut, locks: Locks, color: np.ndarray, rng: np.ran
     colors = color * tint[:, None] * (shade[:, None] * grade)[..., None]
     streak = 1 + rng.normal(0, 0.14 * contrast, (count, 2))
     return strips(locks.paths, sides, widths, colors, np.clip(streak, 0.5, 1.5))
+
+
+def _edge(skull: Skull, cut: Cut, color: np.ndarray, skin: np.ndarray, rng: np.random.Generator) -> Piece:
+    """Fine short hair along the hairline, without which hair begins as a wig does."""
+    turn = np.sort(rng.uniform(-np.pi, np.pi, EDGE_HAIRS))
+    rise = skull.hairline(turn) + np.radians(rng.normal(0.3, 1.1, EDGE_HAIRS))
+    # Combed hair is combed to its roots; other hair lies every way, and more down than up.
+    combed = cut.comb != "whorl"
+    slope = rng.normal(0.9 if combed else -0.3, 0.35 if combed else 0.8, EDGE_HAIRS)
+    length = rng.uniform(5, 13, EDGE_HAIRS)[:, None] * skull.scale / 90 * np.linspace(0, 1, 3)
+    aside = rng.normal(0, 0.5, EDGE_HAIRS)[:, None]
+    lift = np.array([0.5, 1.7, 1.2]) * skull.scale
+    paths = skull.point(turn[:, None] + aside * length, rise[:, None] + slope[:, None] * length, lift)
+    sides = across(paths, skull.normal(paths), rng.normal(0, 0.3, (EDGE_HAIRS, 1)))
+    widths = skull.scale * rng.uniform(0.6, 1.1, (EDGE_HAIRS, 1)) * np.array([1.0, 0.9, 0.0])
+    tone = color * rng.normal(0.85, 0.1, (EDGE_HAIRS, 1))
+    colors = np.repeat((tone + 0.2 * (skin - tone))[:, None], 3, axis=1)
+    return strips(paths, sides, widths, colors, np.ones((EDGE_HAIRS, 2)))
 
 
 KIND = Kind(make, minds=("headwear",))

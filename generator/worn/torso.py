@@ -29,7 +29,9 @@ _RINGS = np.array(
         [204, 114, 104, -142, -205, -170],
         [212, 120, 106, -190, -250, -220],
         [214, 124, 106, -250, -300, -275],
-        [212, 122, 105, -330, -370, -350],
+        [210, 120, 104, -340, -370, -355],
+        [198, 112, 100, -490, -500, -495],
+        [186, 106, 96, -660, -660, -660],
     ]
 )
 _ROUND = 2.35
@@ -37,6 +39,9 @@ _ROUND = 2.35
 
 NECK_MM = (56.0, 60.0, 58.0)
 """Of a neck that is not there: half width, front, back."""
+
+HANGS = 3.5
+"""Below this ring, above which are the shoulders, cloth hangs."""
 
 GAP_MM = 4.0
 """Between the body that a head has and what it wears."""
@@ -107,6 +112,10 @@ class Torso:
         own = maximum_filter(self.own(height), size=3, mode=("nearest", "wrap"))
         gap = GAP_MM * self.scale * np.minimum(1, 0.4 + place)[:, None]
         reach = np.maximum(reach, own + gap * (own > 0))
+        # Cloth hangs from a bust that ends at its chest; it does not follow it in.
+        for row in range(1, rows):
+            if place[row] > HANGS:
+                reach[row] = np.maximum(reach[row], 0.985 * reach[row - 1])
         smoothed = gaussian_filter(reach, (1.2, 1.2), mode=("nearest", "wrap"))
         reach = np.maximum(smoothed, own + 0.4 * gap)
         return reach + offset * self.scale, height

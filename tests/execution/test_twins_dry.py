@@ -274,6 +274,11 @@ def test_what_makes_no_sense_is_one_line(section: dict[str, Any], said: str) -> 
     assert "\n" not in str(caught.value)
 
 
+def test_what_nothing_is_known_of(dry: DryBuild) -> None:
+    with pytest.raises(UsageError, match="nothing says which thing a twin has"):
+        dry.build(dataset={"twins": ["thing"]})
+
+
 def test_a_lens_without_perspective(dry: DryBuild) -> None:
     with pytest.raises(UsageError, match="without perspective another lens changes nothing"):
         dry.build(dataset={"twins": ["lens"]}, render={"projection": "orthographic"})

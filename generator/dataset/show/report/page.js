@@ -322,7 +322,9 @@
     card.append(histogram(factor.histogram, unit));
     const parts = make("div", { class: "parts" });
     factor.parts.names.forEach((name, k) => {
-      const n = factor.parts.rows[k], share = n ? factor.parts.found[k] / n : null;
+      const n = factor.parts.rows[k];
+      if (!n) return;
+      const share = factor.parts.found[k] / n;
       const tiles = make("div", { class: "tiles" });
       for (const sample of factor.examples[k]) {
         const tile = data.variety.tiles[sample];
@@ -331,10 +333,10 @@
         if (!tile.detected) box.append(make("figcaption", { class: "missed", text: "missed" }));
         tiles.append(box);
       }
-      const rate = make("div", { class: "rate", "data-part": name, "data-rows": n, "data-value": share ?? "",
-        text: share === null ? "–" : percent(share, 0) });
+      const rate = make("div", { class: "rate", "data-part": name, "data-rows": n, "data-value": share,
+        text: percent(share, 0) });
       rate.append(make("small", { text: ` of ${whole(n)}` }));
-      if (share !== null) paint(rate, FOUND, share);
+      paint(rate, FOUND, share);
       parts.append(make("div", {}, tiles, rate, make("div", { class: "under", text: name })));
     });
     card.append(parts);
