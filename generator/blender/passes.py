@@ -85,7 +85,7 @@ def _shown(stage: Stage, passes: Sequence[str]) -> Iterator[tuple[str, int]]:
 
 
 def _show(stage: Stage, what: str) -> None:
-    for thing in stage.objects:
+    for thing in stage.at_hand:
         for material in thing.data.materials:
             show(material, what)
 

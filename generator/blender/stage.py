@@ -59,8 +59,12 @@ class Stage:
         self._kind = _kind(look)
         self.needs = needs or Needs.of(look)
         self._fast = FastLight(self.needs) if look.preset == "fast" else None
-        self.head = self._add("head", mesh)
-        self._worn: dict[str, bpy.types.Object] = {}
+        self._worn: dict[str, list[bpy.types.Object]] = {}
+        self._on: list[str] = []
+        own = self._make("head", mesh)
+        self.head = own[0]
+        for thing in own:
+            scene.collection.objects.link(thing)
         self._light: Light = build_light(scene, self.needs, self._fast)
         self._light.add(list(self.head.data.materials))
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -93,12 +97,11 @@ class Stage:
             self.see_through_all()
         else:
             self.scene.cycles.min_transparent_bounces = 0
-        offsets = {one.package: one.offset_mm for one in worn}
-        for package, thing in self._worn.items():
-            set_seen(thing, package in offsets)
-            if package in offsets:
-                moved = METRES * (np.array(offsets[package]) @ BLENDER_FROM_GRAPHICS.T)
-                thing.matrix_world = self.head.matrix_world @ Matrix.Translation(moved.tolist())
+        self._put_on([one.package for one in worn])
+        for one in worn:
+            moved = METRES * (np.array(one.offset_mm) @ BLENDER_FROM_GRAPHICS.T)
+            on = self._worn[one.package][0]
+            on.matrix_world = self.head.matrix_world @ Matrix.Translation(moved.tolist())
         if view.camera != self._seen_by:
             set_camera(self.scene, self._camera, view.camera)
             self._seen_by = view.camera
@@ -117,33 +120,49 @@ class Stage:
         """Have these things at hand, by their package, and no others."""
         for package in [*self._worn]:
             if package not in worn:
+                self._put_on([other for other in self._on if other != package])
                 self._remove(self._worn.pop(package))
         for package, mesh in worn.items():
             if package not in self._worn:
-                self._worn[package] = self._add("worn", mesh)
-                set_seen(self._worn[package], False)
-                self._light.add(list(self._worn[package].data.materials))
-                self._lit = None
+                self._worn[package] = self._make("worn", mesh)
 
     @property
     def objects(self) -> list[bpy.types.Object]:
+        """The head, and what it wears now."""
+        return [self.head, *(self._worn[package][0] for package in self._on)]
+
+    @property
+    def at_hand(self) -> list[bpy.types.Object]:
         """The head, and what it wears in some view."""
-        return [self.head, *self._worn.values()]
+        return [self.head, *(thing[0] for thing in self._worn.values())]
 
-    def _add(self, name: str, mesh: HeadMesh) -> bpy.types.Object:
+    def _put_on(self, packages: Sequence[str]) -> None:
+        """Have these things in the scene, and no others: each costs an image time, seen or not."""
+        for package in [*self._on]:
+            if package not in packages:
+                self._on.remove(package)
+                for thing in self._worn[package]:
+                    self.scene.collection.objects.unlink(thing)
+                self._light.drop(list(self._worn[package][0].data.materials))
+        for package in packages:
+            if package not in self._on:
+                self._on.append(package)
+                for thing in self._worn[package]:
+                    self.scene.collection.objects.link(thing)
+                self._light.add(list(self._worn[package][0].data.materials))
+                self._lit = None
+
+    def _make(self, name: str, mesh: HeadMesh) -> list[bpy.types.Object]:
+        """An object and, for the fast preset, its twin; not in the scene yet."""
         made = _build_object(name, mesh, self._fast, self.needs)
-        self.scene.collection.objects.link(made)
-        if self._fast is not None:
-            # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
-            self.scene.collection.objects.link(_unseen_twin(made))
-        return made
+        # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
+        return [made] if self._fast is None else [made, _unseen_twin(made)]
 
-    def _remove(self, thing: bpy.types.Object) -> None:
-        mesh = thing.data
-        for user in [one for one in self.scene.objects if one.data == mesh]:
-            bpy.data.objects.remove(user)
+    def _remove(self, things: Sequence[bpy.types.Object]) -> None:
+        mesh = things[0].data
         materials = list(mesh.materials)
-        self._light.drop(materials)
+        for thing in things:
+            bpy.data.objects.remove(thing)
         bpy.data.meshes.remove(mesh)
         for material in materials:
             bpy.data.materials.remove(material)
