@@ -10,18 +10,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.errors import UsageError
 from downstream_hpe.evaluation.estimators import compare, estimators
 from downstream_hpe.evaluation.reference import mean_face
 from downstream_hpe.evaluation.scores import Evaluation, summary, within_bounds
 from downstream_hpe.geometry.normalise import Normalisation, normalise
 from downstream_hpe.geometry.rotation import ANGLES, rotation_from_angles
-from downstream_hpe.manifold.cosines import MIN_SAMPLES
+from downstream_hpe.manifold.cosines import MIN_SAMPLES, NARROWEST_DEG
 from downstream_hpe.manifold.decomposition import PAPER_RANKS, Ranks, decompose
 from downstream_hpe.manifold.plot import plot_manifolds
 from downstream_hpe.manifold.tensor_model import TENSOR_FILE, TensorModel
@@ -31,7 +32,7 @@ from downstream_hpe.tables.missing import Missing
 from downstream_hpe.tables.pose_zero import common_zero
 from downstream_hpe.tables.rows import Rows, read_rows
 from downstream_hpe.tables.splits import split_subjects, subjects_by_split
-from downstream_hpe.tables.tensor import open_tensor
+from downstream_hpe.tables.tensor import Axes, open_tensor
 
 if TYPE_CHECKING:
     from downstream_hpe.networks.training import Progress
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 
 CARD_FILE = "model.json"
 PLOT_FILE = "manifolds.png"
+LITTLE = 0.5
+"""Of the error of the answer (0, 0, 0): who is off by more has learned too little."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def fit(
     evaluations = compare(inside, estimators(folder)) if len(inside) else []
     if evaluations:
         card["held_out"] = [summary(e) for e in evaluations]
+    for line in unlearnt(evaluations):
+        note(line)
     (folder / CARD_FILE).write_text(json.dumps(card, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     return Fitted(card, evaluations)
 
@@ -143,8 +148,8 @@ def _tensor_model(
         normalisation=settings.normalisation,
         subjects=trained,
         expression=settings.expression,
+        demands=partial(demands_of, settings.ranks),
     )
-    _check_size(dataset, tensor.shape, settings.ranks)
     folder.mkdir(parents=True, exist_ok=True)
     note(f"tensor {' x '.join(map(str, tensor.shape))}; {tensor.report.text()}")
 
@@ -170,20 +175,41 @@ def _tensor_model(
     }
 
 
-def _check_size(dataset: Path, shape: tuple[int, ...], ranks: tuple[int, int, int, int]) -> None:
-    """DataError, with a way out, where a grid is too small for the ranks or for its curves."""
-    heads, *angles = shape[:4]
-    if heads < ranks[0]:
-        raise DataError(
-            f"{dataset}: {heads} heads to learn from besides those held out, too few for identity rank "
-            f"{ranks[0]}; build more heads, or give --ranks {heads},{','.join(map(str, ranks[1:]))}"
+def demands_of(ranks: Ranks, heads: int, axes: Axes) -> list[str]:
+    """What a grid lacks for ranks and curves, each with a way out."""
+    lacking = []
+    least = max(ranks[0], 2)
+    if heads < least:
+        fewer = f", or give --ranks {heads},{','.join(map(str, ranks[1:]))}" if heads > 1 else ""
+        lacking.append(
+            f"{heads} heads to learn from besides those held out, too few for identity rank {ranks[0]}, "
+            f"expected at least {least}: build more heads{fewer}"
         )
-    for name, size, rank in zip(ANGLES, angles, ranks[1:], strict=True):
-        if size < max(rank, MIN_SAMPLES):
-            raise DataError(
-                f"{dataset}: {size} {name} angles on the grid, expected at least {max(rank, MIN_SAMPLES)}; "
+    for name, axis, rank in zip(ANGLES, axes, ranks[1:], strict=True):
+        least = max(rank, MIN_SAMPLES)
+        if len(axis) < least:
+            lacking.append(
+                f"{len(axis)} {name} angles on the grid, expected at least {least}: "
                 f"build with a finer step or a wider range of {name}"
             )
+        elif np.ptp(axis) <= NARROWEST_DEG:
+            lacking.append(
+                f"{np.ptp(axis):g} degrees of {name} on the grid, expected more than {NARROWEST_DEG:.2g}: "
+                f"build with a wider range of {name}"
+            )
+    return lacking
+
+
+def unlearnt(evaluations: Sequence[Evaluation]) -> list[str]:
+    """A line for what was learned and is hardly better on unseen faces than the answer (0, 0, 0)."""
+    by_name = {e.name: e.mean_mae for e in evaluations}
+    nothing = by_name.pop("constant zero", np.inf)
+    return [
+        f"warning: {name} is off by {mae:.2f} degrees on the subjects held out, where answering zero is by "
+        f"{nothing:.2f}: it learned too little; give it more heads, poses or --epochs"
+        for name, mae in by_name.items()
+        if mae > LITTLE * nothing and not name.startswith("rigid fit")
+    ]
 
 
 def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:

@@ -24,6 +24,15 @@ class LayoutName(str, Enum):
     biwi_npz = "biwi-npz"
 
 
+class ProtocolName(str, Enum):
+    """Choices of --protocol."""
+
+    paper_bounds = "paper-bounds"
+    up_to_99 = "99"
+    fsanet_biwi = "fsanet-biwi"
+    biwi_15677 = "biwi-15677"
+
+
 def evaluate(
     model: Annotated[str, typer.Argument(help="A model folder, an .onnx file, or the name of a model.")],
     dataset: Annotated[Path, typer.Argument(help="A dataset; subjects the model has seen are left out.")],
@@ -37,18 +46,31 @@ def evaluate(
     bounded: Annotated[
         bool, typer.Option("--bounded/--all", help="Only poses in the paper's bounds: 50, 40, 30.")
     ] = True,
+    protocol: Annotated[
+        ProtocolName | None,
+        typer.Option(help="Which labels count, by the papers' names."),
+    ] = None,
+    folds: Annotated[
+        int, typer.Option(min=2, max=1000, help="Folds of subjects, to take a constant rotation out.")
+    ] = 5,
     report: Annotated[Path | None, typer.Option("--out", help="Folder for tables and plots.")] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Errors of the model beside its baselines, per angle and per interval."""
-    from downstream_hpe.evaluation import misses, scored_rows, scores
-    from downstream_hpe.evaluation.estimators import compare, model_estimators
+    """Errors of the model beside its baselines, per angle and per interval; raw and without a constant."""
+    from downstream_hpe.evaluation import constant, misses, scored_rows, scores
+    from downstream_hpe.evaluation.estimators import compare, model_estimators, reference_face
+    from downstream_hpe.evaluation.label_frame import label_frames
+    from downstream_hpe.evaluation.protocols import check_protocol, under
     from downstream_hpe.evaluation.reference import load_reference
     from downstream_hpe.evaluation.reliability import reliability
     from downstream_hpe.prediction.predictor import Predictor
 
     if report is not None and report.exists() and not report.is_dir():
         raise UsageError(f"{report}: --out takes a folder, and this is a file")
+    if protocol is not None and not bounded:
+        raise UsageError("--all scores every label, and --protocol says which; give one of them")
+    if protocol is not None:
+        check_protocol(protocol.value, layout.value)
     predictor = Predictor.load(model)
     face = None if reference is None else load_reference(reference)
     every = model_estimators(model, predictor, face)
@@ -58,13 +80,17 @@ def evaluate(
         measured = scored_rows.photograph_rows(predictor, dataset, layout.value, note)
         predictor.close()
     if bounded:
-        measured = scored_rows.bounded(measured, dataset, note)
+        name = (protocol or ProtocolName.paper_bounds).value
+        measured = under(name, layout.value, measured, dataset, note)
     rows, missed = measured.rows, misses.misses(measured.rows.ypr_deg, measured.missed_deg)
     undetected = len(measured.missed_deg)
     if undetected:
         note(f"no face found in {undetected} of {undetected + len(rows)} rows; they are not in the errors")
     found = compare(rows, every)
+    framed = label_frames(found, measured, reference_face(model, face), folds)
     tables = [scores.markdown(found)]
+    if framed:
+        tables.append(constant.markdown(framed))
     said = predictor.from_landmarks(rows.landmarks).confidence
     if said is not None:
         tables.append(reliability(said, found[-1].geodesic_errors))
@@ -81,7 +107,11 @@ def evaluate(
         note(f"tables and plots: {report}")
     if as_json:
         counts = {"undetected": undetected, "damaged": measured.damaged}
-        typer.echo(json.dumps([{**scores.summary(e), **counts} for e in found]))
+        constants = {e.name: constant.summary(c) for e, c in framed}
+        own = [e for e, _ in framed[len(found) :]]
+        typer.echo(
+            json.dumps([{**scores.summary(e), **constants.get(e.name, {}), **counts} for e in [*found, *own]])
+        )
     else:
         typer.echo("\n".join(tables))
     if measured.damaged:

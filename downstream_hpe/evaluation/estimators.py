@@ -49,6 +49,14 @@ def estimators(folder: Path, reference: np.ndarray | None = None) -> dict[str, E
     }
 
 
+def reference_face(model: str, given: np.ndarray | None) -> np.ndarray | None:
+    """The face of the rigid fit: the one given, or the mean face of a model's folder; a file has none."""
+    folder = model_folder(model)
+    if given is not None or folder is None:
+        return given
+    return TensorModel.load(folder / TENSOR_FILE).reference
+
+
 def model_estimators(model: str, predictor: Predictor, reference: np.ndarray | None) -> dict[str, Estimator]:
     """The model beside its baselines, by name; of a single .onnx file, beside those that need no more.
 

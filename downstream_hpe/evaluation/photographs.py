@@ -21,6 +21,8 @@ from downstream_hpe.tables.rows import Rows
 
 LARGEST_DEG = 99.0
 """The usual filter of AFLW2000-3D: a label with a larger angle is left out."""
+FARTHEST_PX = 1e6
+"""A point of a label beyond it, or that is no number, is none."""
 FACES = 5
 """So many faces are looked for where the label says which one is meant."""
 
@@ -29,13 +31,15 @@ FACES = 5
 class Photograph:
     """bgr uint8 [H, W, 3]; rotation float64 [3, 3], R_C; subject: who it is, or the picture's own name
     where that is unknown; centre float [2]: where in the picture the labelled face is, pixels, None
-    where the label does not say."""
+    where the label does not say. points float64 [68, 3], frame C: iBUG's, as the label itself places them,
+    None where it has none."""
 
     name: str
     subject: str
     bgr: np.ndarray
     rotation: np.ndarray
     centre: np.ndarray | None = None
+    points: np.ndarray | None = None
 
 
 @dataclass
@@ -52,7 +56,8 @@ Loader = Callable[[Path, LeftOut], Iterator[Photograph]]
 
 
 def aflw2000(folder: Path, left_out: LeftOut) -> Iterator[Photograph]:
-    """AFLW2000-3D: image00002.jpg beside image00002.mat.
+    """AFLW2000-3D: image00002.jpg beside image00002.mat. In the layout of 300W-LP, where folders with
+    such pictures lie in the one given, these.
 
     Pose_Para is pitch, yaw, roll, ... in radians; the mean of pt3d_68 says which face is meant.
 
@@ -60,9 +65,11 @@ def aflw2000(folder: Path, left_out: LeftOut) -> Iterator[Photograph]:
     ------
     DataError: no .mat file.
     """
-    for file in _labels(folder, "*", ".mat", ".jpg"):
+    below = {file.parent for file in folder.glob("*/*.jpg")} if not any(folder.glob("*.mat")) else ()
+    files = [file for each in sorted(below) or [folder] for file in _labels(each, "*", ".mat", ".jpg")]
+    for file in files:
         try:
-            ypr_deg, centre = _aflw2000_label(file)
+            ypr_deg, points = _aflw2000_label(file)
             if np.abs(ypr_deg).max() > LARGEST_DEG:
                 left_out.filtered[f"an angle beyond {LARGEST_DEG:g} degrees"] += 1
                 continue
@@ -70,11 +77,16 @@ def aflw2000(folder: Path, left_out: LeftOut) -> Iterator[Photograph]:
         except DataError as error:
             left_out.damaged.append(str(error))
             continue
-        yield Photograph(file.stem, file.stem, bgr, rotation_from_angles(ypr_deg), centre)
+        centre = None if points is None else points[:, :2].mean(axis=0)
+        name = str(file.relative_to(folder).with_suffix(""))
+        yield Photograph(name, name, bgr, rotation_from_angles(ypr_deg), centre, points)
 
 
 def _aflw2000_label(file: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """(yaw, pitch, roll) in degrees, and the middle of the face in pixels, None where it does not say."""
+    """(yaw, pitch, roll) in degrees, and the face's points, [68, 3], frame C, None where it has none.
+
+    z of pt3d_68 is that of 3DDFA's model, towards the viewer.
+    """
     try:
         label = read_arrays(file, ("Pose_Para", "pt3d_68"))
         pose = label["Pose_Para"].ravel()
@@ -86,7 +98,8 @@ def _aflw2000_label(file: Path) -> tuple[np.ndarray, np.ndarray | None]:
     if pose.size < 3 or not np.isfinite(pose[:3]).all():
         raise DataError(f"{file}: Pose_Para is {pose[:7].tolist()}, expected pitch, yaw, roll, ...")
     pitch, yaw, roll = np.rad2deg(pose[:3])
-    return np.array([yaw, pitch, roll]), points[:2].mean(axis=1) if points.shape == (3, 68) else None
+    known = points.shape == (3, 68) and bool((np.abs(points) < FARTHEST_PX).all())
+    return np.array([yaw, pitch, roll]), points.T * [1.0, 1.0, -1.0] if known else None
 
 
 def biwi(folder: Path, left_out: LeftOut, colour_camera: bool = False) -> Iterator[Photograph]:
@@ -172,9 +185,10 @@ FORMATS: dict[str, Loader] = {
 
 def detected_rows(
     photographs: Iterator[Photograph], faces: Callable[[np.ndarray, int], np.ndarray]
-) -> tuple[Rows, np.ndarray]:
-    """Rows of the photographs in which the labelled face is found, and (yaw, pitch, roll) of the others,
-    float64 [M, 3]. Another face than the labelled one is a miss.
+) -> tuple[Rows, np.ndarray, np.ndarray]:
+    """Rows of the photographs in which the labelled face is found; (yaw, pitch, roll) of the others,
+    float64 [M, 3]; and the labels' own points of the rows, float64 [N, 68, 3], NaN where there are none.
+    Another face than the labelled one is a miss.
 
     faces: :meth:`downstream_hpe.prediction.predictor.Predictor.faces`.
 
@@ -183,7 +197,7 @@ def detected_rows(
     DataError: no photograph, or no face in any.
     """
     subjects, rotations, found = [], [], []
-    missed = []
+    missed, own = [], []
     for photograph in photographs:
         points = faces(photograph.bgr, 1 if photograph.centre is None else FACES)
         if photograph.centre is not None:
@@ -194,13 +208,14 @@ def detected_rows(
         subjects.append(photograph.subject)
         rotations.append(photograph.rotation)
         found.append(points[0].astype(np.float32))
+        own.append(np.full((68, 3), np.nan) if photograph.points is None else photograph.points)
     if not found and not missed:
         raise DataError("no photograph is left to look at")
     if not found:
         raise DataError(f"no face found in {len(missed)} photographs")
     names, rotation = np.array(subjects), np.stack(rotations)
     rows = Rows(names, names, angles_from_rotation(rotation), rotation, np.stack(found), len(missed))
-    return rows, np.array(missed).reshape(-1, 3)
+    return rows, np.array(missed).reshape(-1, 3), np.stack(own)
 
 
 def _at(faces: np.ndarray, centre: np.ndarray) -> np.ndarray:

@@ -4,18 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.evaluation.photographs import FORMATS, LeftOut, detected_rows
-from downstream_hpe.evaluation.scores import BOUNDS_DEG, within_bounds
 from downstream_hpe.prediction.inputs import MEDIA
 from downstream_hpe.prediction.predictor import Predictor
 from downstream_hpe.tables.pose_zero import MANIFEST, pose_zero
-from downstream_hpe.tables.rows import Rows, read_missed, read_rows
+from downstream_hpe.tables.rows import Rows, read_exact, read_missed, read_rows
 
 Note = Callable[[str], None]
 
@@ -23,11 +22,13 @@ Note = Callable[[str], None]
 @dataclass(frozen=True)
 class Measured:
     """rows: with a face. missed_deg: float64 [M, 3], (yaw, pitch, roll) of those without one. damaged: how
-    many more could not be read."""
+    many more could not be read. own_points: of the rows, where the labels themselves place them, frame C:
+    float [N, 468, 3], or iBUG's [N, 68, 3]; NaN where there are none, None where no row has any."""
 
     rows: Rows
     missed_deg: np.ndarray
     damaged: int = 0
+    own_points: np.ndarray | None = None
 
 
 def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, note: Note) -> Measured:
@@ -52,7 +53,12 @@ def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, n
         raise DataError(f"{dataset}: the model was trained on every subject in it; give other heads")
     if not unseen.all():
         note(f"{len(np.unique(rows.subjects[~unseen]))} subjects the model was trained on left out")
-    return Measured(rows.take(unseen), missed_deg[~np.isin(subjects, trained)])
+    own = read_exact(dataset, split)
+    return Measured(
+        rows.take(unseen),
+        missed_deg[~np.isin(subjects, trained)],
+        own_points=None if own is None else own[unseen],
+    )
 
 
 def photograph_rows(predictor: Predictor, path: Path, layout: str, note: Note) -> Measured:
@@ -66,26 +72,14 @@ def photograph_rows(predictor: Predictor, path: Path, layout: str, note: Note) -
     """
     left_out = LeftOut()
     try:
-        rows, missed_deg = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
+        rows, missed_deg, own = detected_rows(FORMATS[layout](path, left_out), predictor.faces)
     finally:
         # Also where nothing is left, for they say why.
         for line in left_out.damaged:
             note(f"{line}; left out")
         for reason, count in left_out.filtered.items():
             note(f"{count} photographs left out: {reason}")
-    return Measured(rows, missed_deg, len(left_out.damaged))
-
-
-def bounded(measured: Measured, path: Path, note: Note) -> Measured:
-    """Only the rows in the paper's bounds. DataError: none there."""
-    inside = within_bounds(measured.rows.ypr_deg)
-    bounds = ", ".join(f"{bound:g}" for bound in BOUNDS_DEG)
-    if not inside.any():
-        raise DataError(f"{path}: no pose within {bounds} degrees; use --all")
-    if not inside.all():
-        note(f"{int((~inside).sum())} rows outside {bounds} degrees left out")
-    missed_deg = measured.missed_deg[within_bounds(measured.missed_deg)]
-    return replace(measured, rows=measured.rows.take(inside), missed_deg=missed_deg)
+    return Measured(rows, missed_deg, len(left_out.damaged), own if np.isfinite(own).any() else None)
 
 
 def _expect_tables(path: Path) -> None:

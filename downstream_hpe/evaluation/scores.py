@@ -41,7 +41,7 @@ class Evaluation:
     """Errors of one estimator over N rows, degrees.
 
     mae: of yaw, pitch and roll. maev: mean angle between the rotation's axes. geodesic: mean.
-    geodesic_errors: float64 [N], for distributions.
+    geodesic_errors: float64 [N], for distributions. predicted_deg: float64 [N, 3], the estimates.
     """
 
     name: str
@@ -51,6 +51,7 @@ class Evaluation:
     geodesic: float
     intervals: tuple[Interval, ...]
     geodesic_errors: np.ndarray
+    predicted_deg: np.ndarray
 
     @property
     def mean_mae(self) -> float:
@@ -104,6 +105,7 @@ def evaluate(
         float(geodesic.mean()),
         tuple(intervals),
         geodesic,
+        predicted,
     )
 
 

@@ -23,6 +23,16 @@ SLOWEST = 0.25
 """Least phase, in radians, that a curve runs through over the sampled angles: where a column is a
 straight line, slower cosines only trade a larger alpha for the same values."""
 
+FASTEST = 3.0
+"""Largest beta. A turned face is beta 1; a lens adds harmonics, the k-th by (r / d)^(k - 1), and a face of
+radius r, 0.08 m, is hardly nearer than d = 0.25 m: what is left beyond the third is a thirtieth."""
+
+CLEAR = 0.75
+"""Of the Nyquist limit: nearer to it two curves differ at the samples by ever less, and alpha runs away."""
+
+NARROWEST_DEG = float(np.rad2deg(SLOWEST / FASTEST))
+"""A narrower range has no cosine between the two."""
+
 
 @dataclass(frozen=True)
 class Manifolds:
@@ -65,9 +75,9 @@ def fit_cosines(factor: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
 
     Variable projection (Golub and Pereyra 1973): for a given beta the curve is linear in
     a cos(beta w) + b sin(beta w) + phi, so only beta is searched, over all values from the
-    slowest that the samples can tell from a line to the Nyquist limit of their closest pair, the
-    paper's Fourier start among them. The best is refined by Brent's method. The squared error is
-    therefore never above that of the start, whatever the column.
+    slowest that the samples can tell from a line to FASTEST, or CLEAR of the Nyquist limit of their
+    closest pair, the paper's Fourier start within these among them. The best is refined by Brent's
+    method. The squared error is therefore never above that of the start, whatever the column.
 
     Parameters
     ----------
@@ -80,7 +90,8 @@ def fit_cosines(factor: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
 
     Raises
     ------
-    DataError: too few samples, angles that do not rise, or values that are not finite.
+    DataError: too few samples, angles that do not rise or span less than NARROWEST_DEG, or values that
+        are not finite.
     """
     values = np.asarray(factor, dtype=np.float64)
     angles = np.deg2rad(np.asarray(angles_deg, dtype=np.float64))
@@ -90,8 +101,9 @@ def fit_cosines(factor: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
         raise DataError(f"{len(angles)} angles are too few for a cosine; expected at least {MIN_SAMPLES}")
     if not np.isfinite(values).all() or not (np.diff(angles) > 0).all():
         raise DataError("expected finite factors and rising angles")
-    slowest = SLOWEST / np.ptp(angles)
-    fastest = np.pi / np.diff(angles).min()
+    slowest, fastest = _bounds(angles)
+    if slowest >= fastest:
+        raise DataError(f"angles of {np.rad2deg(np.ptp(angles)):.3g}° in all are too narrow for a cosine")
     search = np.geomspace(slowest, fastest, 400)
     # 1 is where ideal data lie, and what a constant column gets.
     betas = np.concatenate([[1.0] if slowest <= 1.0 <= fastest else [], search])
@@ -99,7 +111,8 @@ def fit_cosines(factor: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
 
 
 def fourier_start(column: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
-    """(alpha, beta, gamma, phi) with beta at the strongest Fourier bin of the column, [D] -> [4]."""
+    """(alpha, beta, gamma, phi) with beta at the strongest Fourier bin of the column, or at the nearest
+    that is searched, [D] -> [4]."""
     angles = np.deg2rad(np.asarray(angles_deg, dtype=np.float64))
     return _solve(np.asarray(column, dtype=np.float64), angles, _fourier_beta(column, angles))[0]
 
@@ -108,7 +121,12 @@ def _fourier_beta(column: np.ndarray, angles: np.ndarray) -> float:
     even = np.linspace(angles[0], angles[-1], len(angles))
     spectrum = np.abs(np.fft.rfft(np.interp(even, angles, column - column.mean())))
     strongest = 1 + int(np.argmax(spectrum[1:]))
-    return 2 * np.pi * strongest / (len(angles) * (even[1] - even[0]))
+    return float(np.clip(2 * np.pi * strongest / (len(angles) * (even[1] - even[0])), *_bounds(angles)))
+
+
+def _bounds(angles: np.ndarray) -> tuple[float, float]:
+    """Least and largest beta of angles in radians."""
+    return SLOWEST / float(np.ptp(angles)), min(FASTEST, CLEAR * np.pi / float(np.diff(angles).min()))
 
 
 def _fit_column(column: np.ndarray, angles: np.ndarray, betas: np.ndarray) -> np.ndarray:

@@ -21,6 +21,9 @@ from downstream_hpe.manifold.cosines import Manifolds, cosine_slopes, cosines
 BATCH = 256
 STARTS = 5
 """Starting angles tried an axis."""
+BEYOND = 0.5
+"""Of an axis' width: so far past either end its angles are searched. Cosines repeat, and a step across many
+periods would come back as thousands of degrees."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class ReconstructionEstimator:
         self._core = (rows @ self._basis.T).reshape(*ranks, -1)  # [Ri, Ry, Rp, Rr, Q]
         self.manifolds = manifolds
         self.normalisation = normalisation
+        middle, half = manifolds.range_deg.mean(axis=1), np.ptp(manifolds.range_deg, axis=1) / 2
+        self._low, self._high = middle - (1 + 2 * BEYOND) * half, middle + (1 + 2 * BEYOND) * half
         axes = [np.linspace(low, high, STARTS) for low, high in manifolds.range_deg]
         self._starts = np.array(list(product(*axes)))
         self._start_bases = np.linalg.qr(self._atoms(self._starts)[0])[0]  # [S, Q, Ri]
@@ -137,6 +142,7 @@ class ReconstructionEstimator:
             diagonal = np.einsum("nii->ni", normal)
             damped = normal + (damping[:, None] * diagonal + 1e-12)[..., None] * np.eye(3)
             step = -np.rad2deg(np.linalg.solve(damped, slope[..., None])[..., 0])
+            step = np.clip(angles + step, self._low, self._high) - angles
             moved = self._linearise(seen, angles + step)
             better = (now := (moved[0] ** 2).sum(axis=1)) <= lost
             # A step too small to matter ends the search, also where rounding keeps it from paying.

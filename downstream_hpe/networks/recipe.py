@@ -15,7 +15,8 @@ from downstream_hpe.networks.pose_network import HEAD_LAYERS, PAPER_LAYERS
 class Recipe:
     """rotation_weight: of the distance |R - R'|. average: share of the running mean of the weights
     that a step leaves; 0: the last weights. components: principal components of the features that the
-    encoder is trained on, 0: the features themselves; floor: added to the standard deviation of each."""
+    encoder is trained on, 0: the features themselves; floor: added to the standard deviation of each.
+    least_steps: of an epoch, which goes over few rows more than once for them."""
 
     layers: tuple[int, ...] = (FEATURES, 384, 128, 64, 9)
     head_layers: tuple[int, ...] = (3, 64, 64, 1)
@@ -30,6 +31,7 @@ class Recipe:
     rotation_weight: float = 1.0
     components: int = 400
     floor: float = 0.01
+    least_steps: int = 20
 
 
 PAPER = Recipe(
@@ -43,6 +45,7 @@ PAPER = Recipe(
     disturbances=NONE,
     rotation_weight=0,
     components=0,
+    least_steps=0,
 )
 RECIPES = {"continuous": Recipe(), "paper": PAPER}
 

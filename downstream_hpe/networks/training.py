@@ -98,7 +98,9 @@ def _epoch(
 ) -> float:
     network.train()
     total, steps = 0.0, 0
-    order = rng.permutation(len(dataset.rotation))
+    rows = len(dataset.rotation)
+    times = max(1, -(-recipe.least_steps * recipe.batch // rows))
+    order = np.concatenate([rng.permutation(rows) for _ in range(times)])
     for first in range(0, len(order), recipe.batch):
         features, factors, rotation = dataset.batch(order[first : first + recipe.batch], recipe, rng)
         points, angles = curves.draw(recipe.batch, rng)

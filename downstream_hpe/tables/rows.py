@@ -11,10 +11,12 @@ import numpy as np
 import pyarrow.dataset as ds
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.geometry.face_mesh import FEATURES, POINTS
 from downstream_hpe.tables.columns import (
     ANGLE_COLUMNS,
     HEAD_COLUMNS,
     angles_of,
+    check_columns,
     check_rows,
     column,
     landmarks_of,
@@ -99,3 +101,21 @@ def read_missed(path: Path | str, split: str | None = None) -> tuple[np.ndarray,
     batches = list(open_tables(path, columns).batches(columns, where))
     subjects = [str(name) for batch in batches for name in column(batch, "subject")]
     return np.array(subjects, dtype=np.str_), np.concatenate([np.empty((0, 3)), *map(angles_of, batches)])
+
+
+def read_exact(path: Path | str, split: str | None = None) -> np.ndarray | None:
+    """Exact landmarks of the rows of :func:`read_rows`: float32 [N, 468, 3], mm, frame C, NaN where a point
+    has no anchor. None: the tables have none."""
+    columns = ["split", "detected"]
+    tables = open_tables(path, columns)
+    if any("landmarks_exact" not in file.physical_schema.names for file in tables.files):
+        return None
+    for file in tables.files:
+        check_columns(
+            file.path, file.physical_schema, ["landmarks_exact"], "expected a table of headturn build"
+        )
+    where = ds.field("detected")
+    if split is not None:
+        where &= ds.field("split") == split
+    batches = tables.batches([*columns, "landmarks_exact"], where)
+    return np.concatenate([vectors(b, "landmarks_exact", FEATURES).reshape(-1, POINTS, 3) for b in batches])

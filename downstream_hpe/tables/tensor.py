@@ -7,7 +7,7 @@ never held whole; it is read head by head, as often as an algorithm passes over 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,6 +38,11 @@ from downstream_hpe.tables.missing import (
     turned_frontal,
 )
 from downstream_hpe.tables.open import Tables, file_batches, open_tables
+
+Axes = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""The grid's angles of yaw, pitch and roll, degrees, rising."""
+Demands = Callable[[int, Axes], list[str]]
+"""What a number of heads on a grid lacks for what is meant with it, a phrase each."""
 
 COLUMNS = (*HEAD_COLUMNS, *INDEX_COLUMNS, *ANGLE_COLUMNS, "rotation", "detected", "landmarks")
 
@@ -109,6 +114,11 @@ class PoseTensor:
         return slab.reshape(*grid, FEATURES)
 
 
+def two_heads(heads: int, axes: Axes) -> list[str]:
+    """A tensor of identities cannot be decomposed from one. Implements Demands."""
+    return [] if heads > 1 else [f"{heads} heads on a grid, expected at least 2"]
+
+
 def open_tensor(
     path: Path | str,
     *,
@@ -116,6 +126,7 @@ def open_tensor(
     normalisation: Normalisation = "rms",
     subjects: Collection[str] | None = None,
     expression: str | None = None,
+    demands: Demands = two_heads,
 ) -> PoseTensor:
     """The tensor of a dataset; reads the small columns once, landmarks only when asked for.
 
@@ -124,10 +135,11 @@ def open_tensor(
     path: dataset, folder of Parquet files, or one file.
     missing: what becomes of cells without landmarks, see :data:`downstream_hpe.tables.missing.Missing`.
     subjects, expression: only these rows; None: all of them.
+    demands: of heads and grid, all said at once, with the missing cells where these fail.
 
     Raises
     ------
-    DataError: as :func:`downstream_hpe.tables.open.open_tables`; fewer than two heads; two rows for
+    DataError: as :func:`downstream_hpe.tables.open.open_tables`; no head, or a demand; two rows for
         one cell; cells without landmarks when missing is "fail"; "exact" without the columns or the
         row for it; "keep" or "frontal" where a head was never detected. UsageError: another word.
     """
@@ -137,11 +149,8 @@ def open_tensor(
     if missing == "exact":
         _require_exact(found)
     cells, files, off_grid = index_cells(found, subjects, expression)
-    if len(cells) < 2:
-        raise DataError(
-            f"{found.path}: {len(cells)} heads on a grid, expected at least 2; "
-            "a tensor of identities cannot be decomposed from one"
-        )
+    if not cells:
+        raise DataError(f"{found.path}: no head on a grid; build with a grid of poses")
     axes = grid_axes(found.path, cells)
     heads = tuple(sorted(cells))
     empty = np.ones((len(heads), *(len(axis) for axis in axes)), dtype=bool)
@@ -152,8 +161,11 @@ def open_tensor(
             absent[(n, *place)] = False
     names = tuple(_cell(heads[cell[0]], axes, cell[1:]) for cell in np.argwhere(empty))
     report = MissingReport(names, int(absent.sum()), off_grid, missing)
+    lacking = demands(len(heads), axes)
     if missing == "fail" and names:
-        raise DataError(f"{found.path}: {report.text()}; choose --missing keep, exact or frontal")
+        lacking.append(f"{report.text()}; choose --missing keep, exact or frontal")
+    if lacking:
+        raise DataError(f"{found.path}: {'; '.join(lacking)}")
     if missing == "exact" and absent.any():
         first = np.argwhere(absent)[0]
         name = _cell(heads[first[0]], axes, first[1:])

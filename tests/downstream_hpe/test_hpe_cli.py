@@ -232,5 +232,8 @@ def test_a_grid_too_coarse_is_refused(tmp_path, monkeypatch, capsys):
         ideal.write(tmp_path / "d" / f"{n}.parquet", ideal.rows(face, f"s{n}", axes))
     assert run("fit", tmp_path / "d", "--out", tmp_path / "m", monkeypatch=monkeypatch) == 1
     error = capsys.readouterr().err
-    assert "3 yaw angles on the grid, expected at least 4" in error
-    assert "finer step or a wider range of yaw" in error
+    for angle in ("yaw", "pitch", "roll"):
+        assert f"3 {angle} angles on the grid, expected at least 4" in error
+        assert f"finer step or a wider range of {angle}" in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "m").exists()

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.manifold.cosines import cosine_slopes, cosines, fit_cosines, fit_manifolds, fourier_start
+from downstream_hpe.manifold.cosines import (
+    FASTEST,
+    cosine_slopes,
+    cosines,
+    fit_cosines,
+    fit_manifolds,
+    fourier_start,
+)
 from downstream_hpe.manifold.decomposition import decompose
 from downstream_hpe.manifold.plot import plot_manifolds
 
@@ -40,6 +47,22 @@ def test_never_worse_than_the_fourier_start(samples, even):
     for k, column in enumerate(columns.T):
         start = cosines(fourier_start(column, angles)[None], angles)[:, 0]
         assert lost[k] <= ((start - column) ** 2).sum() * (1 + 1e-9) + 1e-20
+
+
+def test_a_coarse_axis_gives_no_curve_that_only_sampling_could_make():
+    """Four values of roll, the least there may be: searched up to Nyquist, beta was 9.0 and alpha 212,995."""
+    for angles in (np.linspace(-30, 30, 4), np.array([-90.0, -20, 20, 90])):
+        shaken = np.random.default_rng(1).normal(size=(4, 300))
+        columns = np.concatenate([shaken, [[1], [-1], [1], [-1]] + 1e-3 * shaken[:, :20]], axis=1)
+        params = fit_cosines(columns / np.linalg.norm(columns, axis=0), angles)
+        assert params[:, 1].max() <= FASTEST
+        assert params[:, 0].max() < 1e3
+        if np.diff(angles).min() < 30:
+            # Between the samples the curves stay near them.
+            middle = cosines(params, np.linspace(angles[0], angles[-1], 50))
+            assert np.abs(middle).max() < 10
+    with pytest.raises(DataError, match="4° in all are too narrow"):
+        fit_cosines(np.ones((5, 1)), np.linspace(-2, 2, 5))
 
 
 def test_degenerate_columns_stay_tame():

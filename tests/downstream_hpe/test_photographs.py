@@ -72,6 +72,30 @@ def test_aflw2000_order_units_and_filter(tmp_path):
     assert left_out.filtered == {"an angle beyond 99 degrees": 1}
 
 
+def test_our_export_of_300w_lp_is_read_at_its_root(tmp_path):
+    for n, split in enumerate(("train", "test")):
+        (tmp_path / split).mkdir()
+        aflw(tmp_path / split, "s_neutral_0", YPR + n)
+    (tmp_path / "files.txt").write_text("test/s_neutral_0\ntrain/s_neutral_0\n")
+    # AFLW2000-3D brings code along, with .mat files that are no labels.
+    (tmp_path / "Code").mkdir()
+    savemat(tmp_path / "Code" / "Model_Shape.mat", {"w": 1})
+    left_out = LeftOut()
+    found = {photograph.name: photograph for photograph in aflw2000(tmp_path, left_out)}
+    assert list(found) == ["test/s_neutral_0", "train/s_neutral_0"]
+    assert left_out.damaged == []
+    np.testing.assert_allclose(angles_from_rotation(found["train/s_neutral_0"].rotation), YPR, atol=1e-9)
+    aflw(tmp_path, "image1", YPR)
+    assert [photograph.name for photograph in aflw2000(tmp_path, left_out)] == ["image1"]
+
+
+def test_points_that_can_be_none_are_none(tmp_path):
+    for n, spoilt in enumerate((np.full((3, 68), 1e300), np.full((3, 68), np.nan), np.zeros((2, 68)))):
+        aflw(tmp_path, f"image{n}", YPR, pt3d_68=spoilt)
+    found = list(aflw2000(tmp_path, LeftOut()))
+    assert [(photograph.points, photograph.centre) for photograph in found] == [(None, None)] * 3
+
+
 def test_biwi_angles_are_those_of_its_usual_readers(tmp_path):
     kinect(tmp_path / "hpdb")
     (only,) = biwi(tmp_path, LeftOut())
@@ -130,11 +154,12 @@ def test_the_labelled_face_among_several_and_misses(tmp_path):
         asked.append(limit)
         return two[:limit]
 
-    rows, missed_deg = detected_rows(aflw2000(tmp_path, LeftOut()), faces)
+    rows, missed_deg, own = detected_rows(aflw2000(tmp_path, LeftOut()), faces)
     assert min(asked) > 1
     assert (len(rows), rows.undetected) == (2, 1)
     np.testing.assert_allclose(rows.landmarks[:, :, 0].mean(axis=1), two[::-1, :, 0].mean(axis=1), atol=1e-4)
     np.testing.assert_allclose(missed_deg, [YPR + 2])
+    np.testing.assert_allclose(own[0, :, :2], 100)
     with pytest.raises(DataError, match="no face found in 3 photographs"):
         detected_rows(aflw2000(tmp_path, LeftOut()), lambda bgr, limit: two[:0])
 
@@ -143,7 +168,9 @@ def test_without_a_labelled_place_the_most_prominent_face_is_taken(tmp_path):
     images = np.stack([np.zeros((4, 4, 3)), np.ones((4, 4, 3))]).astype(np.uint8)
     np.savez(tmp_path / "b.npz", image=images, pose=np.stack([YPR, -YPR]))
     photographs = biwi_npz(tmp_path / "b.npz", LeftOut())
-    rows, missed_deg = detected_rows(photographs, lambda bgr, limit: FACE[None][: limit if bgr.any() else 0])
+    rows, missed_deg, _ = detected_rows(
+        photographs, lambda bgr, limit: FACE[None][: limit if bgr.any() else 0]
+    )
     np.testing.assert_allclose(rows.ypr_deg, [-YPR])
     np.testing.assert_allclose(missed_deg, [YPR])
 

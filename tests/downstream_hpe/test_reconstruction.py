@@ -71,3 +71,13 @@ def test_no_worse_than_powell(estimator):
 
 def test_nothing_in_nothing_out(estimator):
     assert estimator.from_landmarks(np.empty((0, 468, 3))).ypr_deg.shape == (0, 3)
+
+
+def test_angles_stay_where_the_curves_are_known(estimator):
+    """What is no face at all used to come back as hundreds of thousands of degrees."""
+    found = estimator.from_landmarks(np.random.default_rng(3).normal(size=(60, 468, 3)))
+    width = np.ptp(estimator.manifolds.range_deg, axis=1)
+    low, high = estimator.manifolds.range_deg.T
+    assert (found.ypr_deg >= low - width / 2 - 1e-9).all()
+    assert (found.ypr_deg <= high + width / 2 + 1e-9).all()
+    assert np.abs(found.ypr_deg).max() > 60

@@ -25,6 +25,7 @@ pytest.importorskip("onnxruntime")
 from downstream_hpe.networks.export import export_int8, export_onnx  # noqa: E402
 from downstream_hpe.networks.pose_network import PoseNetwork, rotation_of  # noqa: E402
 from downstream_hpe.networks.recipe import PAPER, Recipe  # noqa: E402
+from downstream_hpe.networks.samples import Samples  # noqa: E402
 from downstream_hpe.networks.training import train  # noqa: E402
 from downstream_hpe.networks.weights import Weights  # noqa: E402
 from downstream_hpe.prediction.predictor import Predictor  # noqa: E402
@@ -84,6 +85,23 @@ def test_a_checkpoint_of_something_else_is_refused(rows, model, tmp_path):
     (tmp_path / "checkpoint.safetensors").write_bytes(b"no")
     with pytest.raises(ModelError, match="not a readable checkpoint"):
         train(rows, model, SMALL, tmp_path)
+
+
+def test_an_epoch_goes_over_few_rows_more_than_once(rows, model, tmp_path, monkeypatch):
+    """Six heads on 4 x 4 x 4 are two batches; thirty epochs of these teach nothing."""
+    drawn = []
+
+    def batch(self, chosen, recipe, rng):
+        drawn.append(chosen)
+        return whole(self, chosen, recipe, rng)
+
+    whole = Samples.batch
+    monkeypatch.setattr(Samples, "batch", batch)
+    some = rows.take(np.arange(0, len(rows), 10))
+    train(some, model, replace(SMALL, epochs=1, least_steps=5), tmp_path)
+    assert len(drawn) >= 5
+    seen = np.bincount(np.concatenate(drawn), minlength=len(some))
+    assert set(seen) == {seen[0]}
 
 
 @pytest.mark.parametrize("recipe", [PAPER, Recipe()], ids=["paper", "continuous"])
