@@ -30,9 +30,17 @@ def predict(
     ] = 1,
     smooth: Annotated[bool, typer.Option(help="One-euro filter on video.")] = False,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop a video after so many frames.")] = None,
+    fov_deg: Annotated[
+        float | None,
+        typer.Option("--fov", min=1, max=170, help="Degrees that the longer side sees; else a guess."),
+    ] = None,
+    camera: Annotated[
+        Path | None, typer.Option(help='A .json file with "K", 3 x 3, and "width" and "height".')
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Head pose of the faces in pictures, videos and webcams; Ctrl-C ends a webcam."""
+    from downstream_hpe.prediction.cameras import GUESSED_FOV_DEG, chosen_camera, guessed_camera
     from downstream_hpe.prediction.inputs import find_sources
     from downstream_hpe.prediction.predictions import Options, predictions
     from downstream_hpe.prediction.predictor import Predictor
@@ -49,8 +57,9 @@ def predict(
     alone, images, with_face = False, 0, 0
     every = find_sources(inputs, drawn, leave_out)
     alone = len(every) == 1
+    camera_of = chosen_camera(fov_deg, camera)
     predictor = Predictor.load(model)
-    options = Options(faces, smooth, frames)
+    options = Options(faces, smooth, frames, camera_of)
     last, stopped = None, False
     began = ended = 0.0
     with contextlib.ExitStack() as stack:
@@ -77,6 +86,9 @@ def predict(
     rate = f", {(images - 1) / (ended - began):.1f} a second" if images > 1 else ""
     if images:
         note(f"a face in {with_face} of {images} pictures and frames{rate}")
+        if with_face and camera_of is guessed_camera:
+            supposed = f"the longer side sees {GUESSED_FOV_DEG:g} degrees"
+            note(f"distances suppose that {supposed}; say with --fov or --camera what it does")
         if drawn is not None:
             note(f"drawn: {drawn if len(every) > 1 else every[0].copy}")
     if stopped and not any(isinstance(source.path, int) for source in every):

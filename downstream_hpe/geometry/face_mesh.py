@@ -11,6 +11,8 @@ import numpy as np
 TOPOLOGY = "mediapipe-face-mesh-468"
 """Its name in the metadata of the tables."""
 POINTS = 468
+WITH_IRISES = POINTS + 10
+"""Of the mesh with refined landmarks: the same points, then five of each iris."""
 FEATURES = 3 * POINTS
 """Numbers of one face, its landmarks flattened."""
 

@@ -12,10 +12,16 @@ import numpy as np
 
 from downstream_hpe.errors import INSTALL, DataError, ModelError
 from downstream_hpe.geometry.face_mesh import POINTS
+from downstream_hpe.geometry.metrics import geodesic_errors
+from downstream_hpe.geometry.rotation import fit_rotation
+from downstream_hpe.prediction.plausibility import FaceShapes
 
 CONFIDENCE = 0.5
 CLOSER = 2.5
 """Side of the square for a closer look, in sizes of the face."""
+DOUBTFUL = 0.8
+"""Faces less plausible than this are looked at again, turned."""
+ALIKE_DEG = 45.0
 LARGE_ENOUGH = 0.3
 """Faces of this share of the picture's longer side gain nothing from it: benchmarks/small_faces.py."""
 
@@ -27,7 +33,7 @@ class FaceDetector:
         self._models: dict[str, Any] = {}
         self._quiet: set[str] = set()
 
-    def faces(self, bgr: np.ndarray, limit: int = 1) -> np.ndarray:
+    def faces(self, bgr: np.ndarray, limit: int = 1, turned: bool = True) -> np.ndarray:
         """Landmarks of the most prominent faces: float64 [F, 468, 3], 0 <= F <= limit, isotropic pixels,
         frame C.
 
@@ -35,6 +41,9 @@ class FaceDetector:
         where they are small: a face is looked at again in a square cut out around it. Where it finds
         fewer than limit, MediaPipe's full-range face detector, which sees faces half that size, says
         where to cut. bgr: uint8 [H, W, 3]; DataError: another array.
+
+        turned: a doubtful face is looked at in the other quarter turns of the square around it, too, for Face
+        Mesh answers with an upright face on many an upside-down head; and a picture without a face is turned.
         """
         if bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.uint8 or not bgr.size:
             raise DataError(f"expected a uint8 picture [H, W, 3], got {bgr.dtype} {bgr.shape}")
@@ -49,7 +58,42 @@ class FaceDetector:
             if len(found) < limit and not any(_around(face, centre) for face in found):
                 closer = self._closer(rgb, centre, size)
                 found += [] if closer is None else [closer]
+        if turned:
+            looks = [self._looked_at_again(rgb, face) for face in found] or [self._on_its_side(rgb)]
+            found = [face for face in looks if face is not None]
         return np.array(found).reshape(-1, POINTS, 3)
+
+    def _on_its_side(self, rgb: np.ndarray) -> np.ndarray | None:
+        """A plausible face of a picture that shows none as it is."""
+        turned = (self._turned(rgb, quarter) for quarter in (2, 1, 3))
+        return next((face for face in turned if face is not None and _plausible(face) > DOUBTFUL), None)
+
+    def _looked_at_again(self, rgb: np.ndarray, face: np.ndarray) -> np.ndarray | None:
+        """The face, unless it is doubtful and the three quarter turns of the square around it show another
+        one, all the same: then that, or None where it is not plausible either."""
+        if _plausible(face) > DOUBTFUL:
+            return face
+        centre, size = _place(face)
+        corner, square = _square(rgb, centre, size)
+        others: list[np.ndarray] = []
+        for quarter in (1, 3, 2):
+            other = self._turned(square, quarter)
+            if other is None or _alike(face, other) or not all(_alike(one, other) for one in others):
+                return face
+            others.append(other + np.array([*corner, 0]))
+        said = [_plausible(other) for other in others]
+        return others[int(np.argmax(said))] if np.mean(said) > DOUBTFUL else None
+
+    def _turned(self, rgb: np.ndarray, quarter: int) -> np.ndarray | None:
+        """The face of a picture turned by so many quarters, in the pixels of the picture as it is."""
+        found = self.mesh(np.ascontiguousarray(np.rot90(rgb, quarter)))
+        if not found:
+            return None
+        x, y, z = found[0].T
+        for turn in reversed(range(quarter)):
+            # np.rot90 takes column x of a picture of some width to row width - x.
+            x, y = rgb.shape[1 - turn % 2] - y, x
+        return np.stack([x, y, z], axis=1)
 
     def mesh(self, rgb: np.ndarray, limit: int = 1) -> list[np.ndarray]:
         """Face Mesh alone: the faces of a contiguous RGB picture, each float64 [468, 3]."""
@@ -91,12 +135,10 @@ class FaceDetector:
 
     def _closer(self, rgb: np.ndarray, centre: np.ndarray, size: float) -> np.ndarray | None:
         """The face at centre, pixels, from a square around it; None where none is found there."""
-        left, top = np.maximum(centre - CLOSER / 2 * size, 0).astype(int).tolist()
-        right, bottom = np.maximum(centre + CLOSER / 2 * size, 0).astype(int).tolist()
-        square = np.ascontiguousarray(rgb[top:bottom, left:right])
+        corner, square = _square(rgb, centre, size)
         if not square.size:
             return None
-        seen = (face + np.array([left, top, 0]) for face in self.mesh(square, 1))
+        seen = (face + np.array([*corner, 0]) for face in self.mesh(square, 1))
         return next((face for face in seen if _around(face, centre)), None)
 
     def _far_faces(self, rgb: np.ndarray) -> list[tuple[np.ndarray, float]]:
@@ -120,6 +162,23 @@ def _place(face: np.ndarray) -> tuple[np.ndarray, float]:
     """Centre [2] and longer side of the box of a face's landmarks."""
     low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
     return (low + high) / 2, float((high - low).max())
+
+
+def _square(rgb: np.ndarray, centre: np.ndarray, size: float) -> tuple[tuple[int, int], np.ndarray]:
+    """Left and top, and what of the picture lies in the square for a closer look."""
+    left, top = np.maximum(centre - CLOSER / 2 * size, 0).astype(int).tolist()
+    right, bottom = np.maximum(centre + CLOSER / 2 * size, 0).astype(int).tolist()
+    return (left, top), np.ascontiguousarray(rgb[top:bottom, left:right])
+
+
+def _plausible(face: np.ndarray) -> float:
+    """:meth:`FaceShapes.plausibility` of a single one."""
+    return float(FaceShapes.load().plausibility(face[None])[0])
+
+
+def _alike(face: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two looks are of one face, turned the same way."""
+    return bool(geodesic_errors(fit_rotation(face, other[None])[0], np.eye(3)) < ALIKE_DEG)
 
 
 def _around(face: np.ndarray, point: np.ndarray) -> bool:

@@ -12,10 +12,22 @@ LOW_CONFIDENCE = 0.5
 
 
 @dataclass(frozen=True)
+class Placed:
+    """Where a head is. ypr_deg float64 [3]: relative to the optical axis. translation_mm float64 [3]: of the
+    pivot between the ears, frame C. focal_px: of the camera; guessed: no one said what it is."""
+
+    ypr_deg: np.ndarray
+    translation_mm: np.ndarray
+    focal_px: float
+    guessed: bool
+
+
+@dataclass(frozen=True)
 class Face:
     """index: which face of the picture or video. landmarks float [468, 3], pixels. rotation float64 [3, 3],
-    R_C; ypr_deg float64 [3]. confidence: 0 to 1, None where the model gives none. in_range: whether the
-    angles are among those the model was trained on."""
+    R_C, and ypr_deg float64 [3]: as seen towards the face. confidence: 0 to 1, None where the model gives
+    none. in_range: whether the angles are among those the model was trained on. placed: None where no place
+    before the camera fits."""
 
     index: int
     landmarks: np.ndarray
@@ -23,6 +35,7 @@ class Face:
     ypr_deg: np.ndarray
     confidence: float | None
     in_range: bool
+    placed: Placed | None = None
 
     @property
     def box(self) -> tuple[float, float, float, float]:

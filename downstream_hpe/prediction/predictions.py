@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from downstream_hpe.errors import DataError
+from downstream_hpe.geometry.camera import Camera
 from downstream_hpe.geometry.rotation import angles_from_rotation
+from downstream_hpe.prediction.cameras import CameraOf, guessed_camera
 from downstream_hpe.prediction.drawing import draw_faces
-from downstream_hpe.prediction.face import Face
+from downstream_hpe.prediction.face import Face, Placed
 from downstream_hpe.prediction.inputs import Source
 from downstream_hpe.prediction.pictures import read_bgr, write_bgr
-from downstream_hpe.prediction.predictor import Predictor
+from downstream_hpe.prediction.predictor import Pose, Predictor
 from downstream_hpe.prediction.records import Record, record
 from downstream_hpe.prediction.tracks import FaceTracks
 from downstream_hpe.prediction.video import VideoReader, VideoWriter
@@ -26,11 +28,12 @@ from downstream_hpe.prediction.video import VideoReader, VideoWriter
 @dataclass(frozen=True)
 class Options:
     """faces: at most so many a picture or frame. smooth: one-euro filter on video, one a face. frames: of a
-    video, at most so many."""
+    video, at most so many. camera: of a picture, by its size."""
 
     faces: int = 1
     smooth: bool = False
     frames: int | None = None
+    camera: CameraOf = guessed_camera
 
 
 def predictions(
@@ -47,19 +50,24 @@ def predictions(
         try:
             if source.moving:
                 reader = VideoReader(source.path)
+                camera = options.camera(*reader.size)
             else:
                 image = read_bgr(Path(source.name))
+                camera = options.camera(image.shape[1], image.shape[0])
         except DataError as error:
             leave_out(str(error))
             continue
+        look = _Look(
+            predictor, camera, options.faces, FaceTracks(source.moving and options.smooth), not source.moving
+        )
         if source.moving:
-            yield from _video(source, reader, predictor, options, leave_out)
+            yield from _video(source, reader, look, options, leave_out)
         else:
-            yield from _picture(source, image, predictor, options)
+            yield from _picture(source, image, look, options)
 
 
-def _picture(source: Source, image: np.ndarray, predictor: Predictor, options: Options) -> Iterator[Record]:
-    faces = _faces(image, predictor, options, FaceTracks(smooth=False), 0.0)
+def _picture(source: Source, image: np.ndarray, look: _Look, options: Options) -> Iterator[Record]:
+    faces = look.faces(image, 0.0)
     if source.copy is not None:
         write_bgr(draw_faces(image, faces, options.faces > 1), source.copy)
     for face in faces or (None,):
@@ -69,19 +77,18 @@ def _picture(source: Source, image: np.ndarray, predictor: Predictor, options: O
 def _video(
     source: Source,
     reader: VideoReader,
-    predictor: Predictor,
+    look: _Look,
     options: Options,
     leave_out: Callable[[str], None],
 ) -> Iterator[Record]:
     count = 0
     with reader, VideoWriter(source.copy, reader.rate) as writer:
-        tracks = FaceTracks(options.smooth)
         began = time.monotonic()
         for image in islice(reader, options.frames):
             # A file has a rate; a webcam gives a frame whenever it is asked.
             live = isinstance(source.path, int)
             time_s = time.monotonic() - began if live else count / reader.rate
-            faces = _faces(image, predictor, options, tracks, time_s)
+            faces = look.faces(image, time_s)
             if source.copy is not None:
                 writer.add(draw_faces(image, faces, options.faces > 1))
             for face in faces or (None,):
@@ -91,18 +98,39 @@ def _video(
         leave_out(f"{source.name}: ended after {count} of {reader.expected} frames; what there was is kept")
 
 
-def _faces(
-    image: np.ndarray, predictor: Predictor, options: Options, tracks: FaceTracks, time_s: float
-) -> list[Face]:
-    found = predictor.faces(image, options.faces)
-    if not len(found):
-        tracks.indices(found, time_s)
-        return []
-    pose = predictor.from_landmarks(found)
-    faces = []
-    for n, index in enumerate(tracks.indices(found, time_s)):
-        rotation = tracks.steady(index, pose.rotation[n].astype(np.float64), time_s)
-        ypr_deg = angles_from_rotation(rotation)
-        confidence = None if pose.confidence is None else float(pose.confidence[n])
-        faces.append(Face(index, found[n], rotation, ypr_deg, confidence, bool(predictor.in_range(ypr_deg))))
-    return sorted(faces, key=lambda face: face.index)
+@dataclass(frozen=True)
+class _Look:
+    """What is done with each picture or frame of one source. turned: as :meth:`Predictor.faces`; videos keep
+    their rate."""
+
+    predictor: Predictor
+    camera: Camera
+    limit: int
+    tracks: FaceTracks
+    turned: bool
+
+    def faces(self, image: np.ndarray, time_s: float) -> list[Face]:
+        found = self.predictor.faces(image, self.limit, self.turned)
+        if not len(found):
+            self.tracks.indices(found, time_s)
+            return []
+        pose = self.predictor.from_landmarks(found, self.camera)
+        faces = []
+        for n, index in enumerate(self.tracks.indices(found, time_s)):
+            raw = pose.rotation[n].astype(np.float64)
+            rotation = self.tracks.steady(index, raw, time_s)
+            ypr_deg = angles_from_rotation(rotation)
+            confidence = None if pose.confidence is None else float(pose.confidence[n])
+            inside = bool(self.predictor.in_range(ypr_deg))
+            placed = self._placed(pose, n, raw.T @ rotation)
+            faces.append(Face(index, found[n], rotation, ypr_deg, confidence, inside, placed))
+        return sorted(faces, key=lambda face: face.index)
+
+    def _placed(self, pose: Pose, n: int, steadied: np.ndarray) -> Placed | None:
+        """steadied: what the filter turned the head by, [3, 3]."""
+        if pose.axis_rotation is None or pose.translation_mm is None:
+            raise ValueError("a pose without its place")
+        if not np.isfinite(pose.translation_mm[n]).all():
+            return None
+        ypr_deg = angles_from_rotation(pose.axis_rotation[n] @ steadied)
+        return Placed(ypr_deg, pose.translation_mm[n], self.camera.focal_px, self.camera.guessed)

@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from downstream_hpe.errors import DataError, ModelError
-from downstream_hpe.geometry.face_mesh import POINTS
+from downstream_hpe.geometry.camera import Camera
+from downstream_hpe.geometry.face_mesh import POINTS, WITH_IRISES
+from downstream_hpe.geometry.rotation import angles_from_rotation, rotation_from_angles
 from downstream_hpe.prediction import onnx_file
 from downstream_hpe.prediction.detector import FaceDetector
 from downstream_hpe.prediction.onnx_file import FORMAT, SHAPES
 from downstream_hpe.prediction.onnx_shapes import BATCH
+from downstream_hpe.prediction.plausibility import FaceShapes, quarter_turns
+from downstream_hpe.prediction.six_degrees import place, undone
 from downstream_hpe.reading import parse_json, read_limited
 
 MODEL_FILE = "model.onnx"
@@ -26,12 +30,20 @@ MODELS = Path(__file__).parents[1] / "models"
 
 @dataclass(frozen=True)
 class Pose:
-    """ypr_deg float32 [N, 3], (yaw, pitch, roll); rotation float32 [N, 3, 3], R_C; confidence
-    float32 [N], 0 to 1, or None where the model gives none."""
+    """ypr_deg float32 [N, 3], (yaw, pitch, roll), and rotation float32 [N, 3, 3], R_C: as seen towards the
+    face. confidence float32 [N], 0 to 1, or None where the model gives none.
+
+    With a camera, else None: axis_ypr_deg float64 [N, 3] and axis_rotation float64 [N, 3, 3], relative to
+    the optical axis; translation_mm float64 [N, 3], of the pivot between the ears, frame C, in the scale of
+    the mean head. NaN where no place before the camera fits the landmarks.
+    """
 
     ypr_deg: np.ndarray
     rotation: np.ndarray
     confidence: np.ndarray | None = None
+    axis_ypr_deg: np.ndarray | None = None
+    axis_rotation: np.ndarray | None = None
+    translation_mm: np.ndarray | None = None
 
 
 class Predictor:
@@ -105,25 +117,58 @@ class Predictor:
         low, high = self.range_deg.T
         return ((ypr_deg >= low) & (ypr_deg <= high)).all(axis=-1)
 
-    def from_landmarks(self, landmarks: np.ndarray) -> Pose:
+    def from_landmarks(self, landmarks: np.ndarray, camera: Camera | None = None) -> Pose:
         """Pose of faces given by their landmarks.
 
-        landmarks: float [N, 468, 3], MediaPipe's order, isotropic (x, y, z in one unit, such as
-        x * width, y * height, z * width of MediaPipe's output), frame C.
+        landmarks: float [N, 468, 3] or, with those of the irises, which are left out, [N, 478, 3];
+        MediaPipe's order, isotropic (x, y, z in one unit, such as x * width, y * height, z * width of
+        MediaPipe's output), frame C; with a camera in its pixels.
+        camera: gives translations and angles relative to the optical axis. Where it is not guessed, the
+        perspective of the picture's edge is undone before the model sees the face.
 
         Raises
         ------
         DataError: another shape, or landmarks that are not finite.
         """
-        points = np.asarray(landmarks, dtype=np.float32)
-        if points.ndim != 3 or points.shape[1:] != (POINTS, 3):
-            raise DataError(f"expected landmarks of shape [N, {POINTS}, 3], got {points.shape}")
+        points = np.asarray(landmarks)
+        if points.ndim != 3 or points.shape[1:] not in ((POINTS, 3), (WITH_IRISES, 3)):
+            raise DataError(
+                f"expected landmarks of shape [N, {POINTS}, 3] or [N, {WITH_IRISES}, 3], got {points.shape}"
+            )
+        pose = self._seen(points[:, :POINTS])
+        if camera is None:
+            return pose
+        points = points[:, :POINTS].astype(np.float64)
+        if not camera.guessed:
+            pose = self._seen(undone(points, pose.rotation, camera))
+        rotation, translation_mm = place(points, pose.rotation.astype(np.float64), camera)
+        return replace(
+            pose,
+            axis_ypr_deg=angles_from_rotation(rotation),
+            axis_rotation=rotation,
+            translation_mm=translation_mm,
+        )
+
+    def _seen(self, landmarks: np.ndarray) -> Pose:
+        points = np.ascontiguousarray(landmarks, dtype=np.float32)
         if not np.isfinite(points).all():
             raise DataError("landmarks are not finite; leave out faces that were not detected")
+        quarters = quarter_turns(points)
+        if quarters.any():
+            # The model knows upright faces alone.
+            turns = rotation_from_angles(np.outer(90.0 * quarters, [0, 0, 1]))
+            upright = self._upright((points @ turns).astype(np.float32))
+            rotation = turns @ upright.rotation
+            ypr_deg = np.where(quarters[:, None] == 0, upright.ypr_deg, angles_from_rotation(rotation))
+            rotation = np.where(quarters[:, None, None] == 0, upright.rotation, rotation)
+            return Pose(ypr_deg.astype(np.float32), rotation.astype(np.float32), upright.confidence)
+        return self._upright(points)
+
+    def _upright(self, points: np.ndarray) -> Pose:
         if not len(points):
             none = {name: np.empty((0, *SHAPES[name]), dtype=np.float32) for name in self._outputs}
             return _pose(none)
-        batches = [self._run(points[start : start + BATCH]) for start in range(0, len(points), BATCH)]
+        batches = [self.graph(points[start : start + BATCH]) for start in range(0, len(points), BATCH)]
         found = {name: np.concatenate([batch[name] for batch in batches]) for name in self._outputs}
         if not all(np.isfinite(value).all() for value in found.values()):
             if (np.ptp(points, axis=1) == 0).all(axis=1).any():
@@ -131,9 +176,15 @@ class Predictor:
                     "the landmarks of a face all coincide; leave out faces that were not detected"
                 )
             raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
+        if "confidence" in found:
+            # No surer of a pose than of there being a face.
+            plausible = FaceShapes.load().plausibility(points).astype(np.float32)
+            found["confidence"] = np.minimum(found["confidence"], plausible)
         return _pose(found)
 
-    def _run(self, points: np.ndarray) -> dict[str, np.ndarray]:
+    def graph(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        """What the model alone says of upright faces, by the name of its output. points: float32 [N, 468, 3],
+        N at most BATCH. ModelError: it fails."""
         try:
             values = self._session.run(self._outputs, {"landmarks": points})
         except _faults() as error:
@@ -144,17 +195,18 @@ class Predictor:
             raise ModelError(f"{self._name}: gives another number of poses than of faces; {EXPORT_AGAIN}")
         return dict(zip(self._outputs, values, strict=True))
 
-    def from_image(self, bgr: np.ndarray, faces: int = 1) -> Pose | None:
+    def from_image(self, bgr: np.ndarray, faces: int = 1, camera: Camera | None = None) -> Pose | None:
         """Pose of the most prominent faces of a picture, at most so many; None where no face is found.
 
-        bgr: uint8 [H, W, 3]. Needs mediapipe, which is opened on the first call.
+        bgr: uint8 [H, W, 3]. camera: as :meth:`from_landmarks`. Needs mediapipe, which is opened on the
+        first call.
         """
         points = self.faces(bgr, faces)
-        return self.from_landmarks(points) if len(points) else None
+        return self.from_landmarks(points, camera) if len(points) else None
 
-    def faces(self, bgr: np.ndarray, limit: int = 1) -> np.ndarray:
+    def faces(self, bgr: np.ndarray, limit: int = 1, turned: bool = True) -> np.ndarray:
         """Landmarks of the most prominent faces, as :meth:`FaceDetector.faces` gives them."""
-        return self._detector.faces(bgr, limit)
+        return self._detector.faces(bgr, limit, turned)
 
     def close(self) -> None:
         """Free the face detector, if one was opened."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -32,9 +33,18 @@ SCHEMA = pa.schema(
         ("box_y", pa.float64()),
         ("box_width", pa.float64()),
         ("box_height", pa.float64()),
+        ("axis_yaw_deg", pa.float64()),  # relative to the optical axis
+        ("axis_pitch_deg", pa.float64()),
+        ("axis_roll_deg", pa.float64()),
+        ("x_mm", pa.float64()),  # the pivot from the camera, frame C; null where no place fits
+        ("y_mm", pa.float64()),
+        ("z_mm", pa.float64()),
+        ("focal_px", pa.float64()),
+        ("camera_guessed", pa.bool_()),
     ]
 )
 COLUMNS = tuple(SCHEMA.names)
+_ANGLES, _BOX, _PLACE = COLUMNS[5:8], COLUMNS[10:14], COLUMNS[14:20]
 ROWS_AT_ONCE = 1000
 
 Record = dict[str, Any]
@@ -46,9 +56,13 @@ def record(name: str, frame: int | None, time_s: float | None, face: Face | None
     row.update(input=name, frame=frame, time_s=time_s, found=face is not None)
     if face is not None:
         row.update(face=face.index, in_range=face.in_range)
-        row.update(zip(COLUMNS[5:8], (round(float(angle), 3) for angle in face.ypr_deg), strict=True))
-        row.update(zip(COLUMNS[10:], (round(float(side), 2) for side in face.box), strict=True))
+        row.update(zip(_ANGLES, (round(float(angle), 3) for angle in face.ypr_deg), strict=True))
+        row.update(zip(_BOX, (round(float(side), 2) for side in face.box), strict=True))
         row["confidence"] = None if face.confidence is None else round(face.confidence, 4)
+        if face.placed is not None:
+            place = (*face.placed.ypr_deg, *face.placed.translation_mm)
+            row.update(zip(_PLACE, (round(float(number), 3) for number in place), strict=True))
+            row.update(focal_px=round(face.placed.focal_px, 2), camera_guessed=face.placed.guessed)
     return row
 
 
@@ -61,6 +75,10 @@ def text(row: Record, numbered: bool = False) -> str:
     parts += [f"{name} {row[f'{name}_deg']:.1f}" for name in ANGLES]
     if row["confidence"] is not None:
         parts.append(f"confidence {row['confidence']:.2f}")
+    if row["z_mm"] is not None:
+        about = "about " if row["camera_guessed"] else ""
+        distance_mm = math.hypot(row["x_mm"], row["y_mm"], row["z_mm"])
+        parts.append(f"{about}{distance_mm / 1000:.2f} m away")
     if not row["in_range"]:
         parts.append("outside the trained range")
     return f"{where}: {', '.join(parts)}"

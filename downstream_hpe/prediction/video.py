@@ -32,7 +32,8 @@ FALLBACK_RATE = 30.0
 class VideoReader:
     """Frames of a file (its path) or a webcam (its number, from 0). Use it as a context manager.
 
-    rate: frames a second. expected: how many frames a file says it has, 0 where it does not.
+    rate: frames a second. size: width and height of a frame, pixels. expected: how many frames a file says
+    it has, 0 where it does not.
 
     Raises
     ------
@@ -55,6 +56,7 @@ class VideoReader:
         if size[0] * size[1] > MAX_PIXELS:
             self._capture.release()
             raise DataError(f"{source}: frames of {size[0]} x {size[1]} pixels; make them smaller")
+        self.size = (int(size[0]), int(size[1]))
         rate = self._capture.get(cv2.CAP_PROP_FPS)
         self.rate = rate if np.isfinite(rate) and rate > 0 else FALLBACK_RATE
         self.expected = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))

@@ -67,7 +67,8 @@ def test_folder_with_everything(shipped, photograph, tmp_path, monkeypatch, capf
     assert errors.splitlines()[0].endswith("1 files that are no picture or video skipped (notes.txt)")
     # And the detector's own start-up notes are not among them.
     assert "a face in 2 of 3 pictures and frames" in errors.splitlines()[1]
-    assert errors.splitlines()[2:] == [f"drawn: {drawn}"]
+    assert errors.splitlines()[2].startswith("distances suppose that the longer side sees 60 degrees")
+    assert errors.splitlines()[3:] == [f"drawn: {drawn}"]
     assert "black.png: no face found" in output
     assert "both.jpg: face 0, yaw" in output and "both.jpg: face 1, yaw" in output
     rows = pq.read_table(table).to_pylist()
@@ -80,6 +81,28 @@ def test_folder_with_everything(shipped, photograph, tmp_path, monkeypatch, capf
     assert {f.name for f in drawn.rglob("*.png")} == {"astronaut.png", "black.png", "both.png"}
     assert run("predict", pictures / "deep", "--json", monkeypatch=monkeypatch) == 0
     assert json.loads(capfd.readouterr().out) == rows[3]
+
+
+def test_cameras_that_are_said(photograph, tmp_path, monkeypatch, capfd):
+    photograph.save(tmp_path / "a.png")
+    photograph.resize((256, 256)).crop((0, 0, 256, 200)).save(tmp_path / "b.png")
+    camera = tmp_path / "k.json"
+    camera.write_text('{"K": [[512, 0, 256], [0, 512, 256], [0, 0, 1]], "width": 512, "height": 512}')
+    found = []
+    for options in (["--fov", "53.13010235"], ["--camera", camera], ["--fov", "28.07248694"]):
+        assert run("predict", tmp_path / "a.png", "--json", *options, monkeypatch=monkeypatch) == 0
+        output, errors = capfd.readouterr()
+        assert "suppose" not in errors
+        found.append(json.loads(output))
+    assert found[0] == found[1] and not found[0]["camera_guessed"] and found[0]["focal_px"] == 512
+    assert found[2]["z_mm"] == pytest.approx(2 * found[0]["z_mm"], rel=0.1)
+    # Her face is left of the middle and above it, so she turns more to the left of the axis than to us.
+    assert found[0]["x_mm"] < 0 and found[0]["y_mm"] < 0 and 300 < found[0]["z_mm"] < 1500
+    both = ("predict", tmp_path / "a.png", tmp_path / "b.png", "--camera", camera)
+    assert run(*both, monkeypatch=monkeypatch) == 3
+    output, errors = capfd.readouterr()
+    assert " m away" in output and "about" not in output
+    assert f"256 x 200 pixels, and {camera} is for 512 x 512" in errors
 
 
 def test_small_faces_are_found_and_placed_as_well_as_large_ones(photograph):
@@ -138,7 +161,7 @@ def test_labelled_photographs(shipped, photograph, tmp_path, monkeypatch, capsys
 def test_ctrl_c_keeps_what_was_written(shipped, tmp_path, monkeypatch, capsys):
     faces = iter([np.random.default_rng(0).uniform(10, 50, size=(1, 468, 3))])
 
-    def next_face(self, bgr, limit):
+    def next_face(self, bgr, limit, turned):
         try:
             return next(faces)
         except StopIteration:
@@ -167,6 +190,8 @@ MISTAKES = {
     "no room for the copies": (["predict", "a.png", "--draw", "a.png/d"], 1, "cannot be written"),
     "no folder for the report": (["evaluate", "headturn", "d", "--out", "text.png"], 2, "takes a folder"),
     "overwriting": (["predict", "a.png", "--draw", "."], 2, "a.png: --draw would overwrite it"),
+    "two cameras": (["predict", "a.png", "--fov", "60", "--camera", "k.json"], 2, "give one"),
+    "no camera": (["predict", "a.png", "--camera", "text.png"], 1, "text.png: not readable as a camera"),
     "no dataset": (["evaluate", "headturn", "nowhere"], 1, "nowhere: not there; expected a dataset"),
     "a photograph": (["evaluate", "headturn", "a.png"], 2, "for others there is downstream-hpe predict"),
     "photographs": (["evaluate", "headturn", "p"], 2, "--format aflw2000, biwi or biwi-npz"),

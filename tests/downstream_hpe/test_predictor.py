@@ -45,6 +45,15 @@ def test_poses_with_and_without_confidence(tmp_path):
     assert load(tiny_model(confidence=False), tmp_path).from_landmarks(FACE).confidence is None
 
 
+def test_points_of_irises_are_taken_and_left_out(tmp_path):
+    model = load(tiny_model(), tmp_path)
+    refined = np.concatenate([FACE, np.full((2, 10, 3), 1e3)], axis=1)
+    np.testing.assert_array_equal(model.from_landmarks(refined).ypr_deg, model.from_landmarks(FACE).ypr_deg)
+    for points in (FACE[:, :467], refined[:, :477], FACE[0], FACE[..., :2]):
+        with pytest.raises(DataError, match=r"shape \[N, 468, 3\] or \[N, 478, 3\], got"):
+            model.from_landmarks(points)
+
+
 def test_angles_inside_and_outside_the_trained_range(tmp_path):
     inside = load(tiny_model(), tmp_path).in_range(np.array([[50, -40, 30], [51, 0, 0], [0, 0, -31]]))
     assert inside.tolist() == [True, False, False]

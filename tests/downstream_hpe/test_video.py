@@ -15,6 +15,7 @@ from downstream_hpe.geometry.rotation import rotation_from_angles
 from downstream_hpe.prediction.inputs import Source, find_sources
 from downstream_hpe.prediction.predictions import Options, predictions
 from downstream_hpe.prediction.predictor import Pose
+from downstream_hpe.prediction.six_degrees import place
 from downstream_hpe.prediction.smoothing import OneEuroFilter
 from downstream_hpe.prediction.tracks import FaceTracks
 
@@ -45,14 +46,16 @@ def at(x):
 class Spots:
     """Stands for a predictor: a face at every column of bright pixels, whose yaw is where it is."""
 
-    def faces(self, bgr, limit):
+    def faces(self, bgr, limit, turned):
         columns = np.flatnonzero(bgr[32, :, 0] > 100)
         starts = columns[np.diff(columns, prepend=-9) > 1]
         return np.array([at(x + 5) for x in starts[:limit]]).reshape(-1, 468, 3)
 
-    def from_landmarks(self, landmarks):
+    def from_landmarks(self, landmarks, camera):
         ypr = np.stack([landmarks[:, :, 0].mean(1), landmarks[:, 0, 0] * 0, landmarks[:, 0, 0] * 0], axis=1)
-        return Pose(ypr, rotation_from_angles(ypr), np.full(len(ypr), 0.9))
+        rotation = rotation_from_angles(ypr)
+        axis, translation_mm = place(landmarks, rotation, camera)
+        return Pose(ypr, rotation, np.full(len(ypr), 0.9), ypr, axis, translation_mm)
 
     def in_range(self, ypr_deg):
         return bool(ypr_deg[0] < 50)

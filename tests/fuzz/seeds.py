@@ -71,6 +71,8 @@ def dataset_seeds() -> Iterator[tuple[str, bytes]]:
         built = build_dataset(root, "none", HEADS[:1], grid_plan((0, 0, 1), (0, 0, 1), (0, 0, 1)))
         yield "manifest", RAW + (root / "manifest.json").read_bytes()
         yield "hpe_manifest", RAW + b'{"configuration": {"poses": {"frame": "canonical"}}}'
+        matrix = b"[[900.0, 0, 500], [0, 900.0, 375], [0, 0, 1]]"
+        yield "camera", RAW + b'{"K": %b, "width": 1000, "height": 750}' % matrix
         [file] = root.glob("data/*/*.parquet")
         row = pq.read_table(file)
         for name in ("landmarks", "landmarks_exact"):  # of which zeros take no room

@@ -536,6 +536,14 @@ def biwi(data: bytes) -> None:
     list(read(folder, LeftOut(), colour_camera=bool(calibration)))
 
 
+@target(words='"K" "width" "height"')
+def camera(data: bytes) -> None:
+    """The camera of pictures of which the pose is asked."""
+    from downstream_hpe.prediction.cameras import camera_file
+
+    camera_file(folder_with(k__json=as_json("camera", data)) / "k.json")(1000, 750)
+
+
 @target(weight=2)
 def picture(data: bytes) -> None:
     """A picture of which the pose is asked."""
