@@ -202,7 +202,7 @@ def test_a_setting_touches_the_table_and_the_place_that_uses_it(
     before, mark, after = table.read_text().partition("    ambient: float = setting(")
     table.write_text(before + EXPOSURE + mark + after)
     use = tmp_path / "generator" / "blender" / "stage.py"
-    before, mark, after = use.read_text().partition("            self._light.set(view.look, environment)\n")
+    before, mark, after = use.read_text().partition("            self._light.set(*lit)\n")
     assert mark
     use.write_text(
         before + mark + "            self.scene.view_settings.exposure = view.look.exposure\n" + after
