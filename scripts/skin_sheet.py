@@ -2,11 +2,13 @@
 """Parametric heads as paint alone and with occlusion, gloss, relief and lamps, and what that costs.
 
     python scripts/skin_sheet.py docs/images/skin.jpg
+    python scripts/skin_sheet.py beside.jpg --photograph
     python scripts/skin_sheet.py --time 40
 
 The upper row is lit by the environment alone, as in earlier releases; the lower by the same with all that
---variety photo draws of how surfaces answer light. With --time, images of 256 pixels of the first head are
-rendered in both ways by turns, each in its own light and pose, and the medians and least times are printed.
+--variety photo draws of how surfaces answer light, with --photograph beside one of a person, to judge
+them by (scikit-image's astronaut: NASA, public domain). With --time, images of 256 pixels of the first head
+are rendered in both ways by turns, each in its own light and pose; medians and least times are printed.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from head_sheet import FACE_MM, RADIUS_MM
 from PIL import Image
+from skimage import data
 
 from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions
@@ -61,8 +64,8 @@ def packages(count: int, seed: int, lane: Lane, folder: Path) -> list[Path]:
     return made
 
 
-def sheet(heads: list[Path], lane: Lane, pixels: int) -> np.ndarray:
-    """Two rows: without and with."""
+def sheet(heads: list[Path], lane: Lane, pixels: int, beside: bool) -> np.ndarray:
+    """Two rows: without and with. beside: a photograph."""
     config = load_config(None, {"render": {"resolution": pixels, "lens_mm": 200.0}})
     camera = framed_camera(config.render, RADIUS_MM)
     columns = []
@@ -70,7 +73,13 @@ def sheet(heads: list[Path], lane: Lane, pixels: int) -> np.ndarray:
         looks = (unshaded(light), replace(light, **SKIN))
         views = Views.of([View((18.0, 0.0, 0.0), camera, look) for look in looks])
         columns.append(np.vstack([*lane.shots.take(head, views, Folders())]))
-    return np.hstack(columns)
+    return np.hstack([*columns, photograph(pixels)] if beside else columns)
+
+
+def photograph(pixels: int) -> np.ndarray:
+    """A woman's head and shoulders, uint8 [2 pixels, pixels, 3]."""
+    cut = Image.fromarray(data.astronaut()[:380, 130:320])
+    return np.asarray(cut.resize((pixels, 2 * pixels), Image.Resampling.LANCZOS))
 
 
 def timed(head: Path, lane: Lane, images: int) -> str:
@@ -109,6 +118,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--pixels", type=int, default=360)
+    parser.add_argument("--photograph", action="store_true")
     parser.add_argument("--time", type=int, default=0, metavar="IMAGES")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -116,7 +126,9 @@ def main() -> None:
         try:
             heads = packages(len(LIGHTS) if given.out else 1, given.seed, lane, Path(name))
             if given.out:
-                Image.fromarray(sheet(heads, lane, given.pixels)).save(given.out, quality=88)
+                Image.fromarray(sheet(heads, lane, given.pixels, given.photograph)).save(
+                    given.out, quality=88
+                )
             if given.time:
                 print(timed(heads[0], lane, given.time))
         finally:
