@@ -69,8 +69,10 @@ def painting(stage: Stage, passes: Sequence[str]) -> Iterator[Iterator[tuple[str
     with _restored(scene.cycles, "pixel_filter_type", "filter_width"), _restored(render, "film_transparent"):
         scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
         render.film_transparent, render.use_border = True, False
-        yield _shown(stage, passes)
-    _show(stage, LIT)
+        try:
+            yield _shown(stage, passes)
+        finally:
+            _show(stage, LIT)  # or the next picture would be of classes
 
 
 def _shown(stage: Stage, passes: Sequence[str]) -> Iterator[tuple[str, int]]:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.errors import HeadError
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
@@ -102,7 +101,7 @@ class Wardrobe:
         self._folder.mkdir(parents=True, exist_ok=True)
         self._fit: Fit | None = None
         self._name = ""
-        self._made: dict[tuple[str, ...], Thing | str] = {}
+        self._made: dict[tuple[str, ...], Thing | CannotWear] = {}
         self._count = 0
 
     def dress(self, name: str, mesh: HeadMesh, points: np.ndarray, views: Views, things: str = "") -> Outfits:
@@ -127,15 +126,14 @@ class Wardrobe:
     def _outfit(self, view: View) -> tuple[list[tuple[Thing, np.ndarray]], str]:
         things, reasons = [], []
         for kind in view.look.wears:
-            made = self._thing(kind, view)
-            if isinstance(made, str):
-                reasons.append(f"{kind}: {made}")
-            else:
-                things.append((made, self._offset(kind, view)))
+            try:
+                things.append((self._thing(kind, view), self._offset(kind, view)))
+            except CannotWear as error:
+                reasons.append(f"{kind}: {error}")
         return things, "; ".join(reasons)
 
-    def _thing(self, kind: str, view: View) -> Thing | str:
-        """What is made, or the reason why it cannot be."""
+    def _thing(self, kind: str, view: View) -> Thing:
+        """What is made for a view. Raises CannotWear where it was not."""
         assert self._fit is not None, "a head that is dressed is known"
         maker: Kind = WORN.get(kind)
         style, variant = getattr(view.look, kind), f"{view.look.wear_variant:.6g}"
@@ -147,15 +145,17 @@ class Wardrobe:
                 if style not in STYLES.get(kind, (style,)):
                     raise CannotWear(f"there is no {style!r}")
                 mesh = maker.make(replace(self._fit, others=others), style, rng)
-            except CannotWear as error:
-                self._made[key] = str(error)
-            else:
+                if not np.isfinite(mesh.vertices).all():
+                    raise CannotWear("what was made has no finite shape")
                 self._made[key] = self._packed(kind, mesh)
-        return self._made[key]
+            except CannotWear as error:
+                self._made[key] = error
+        made = self._made[key]
+        if isinstance(made, CannotWear):
+            raise made
+        return made
 
     def _packed(self, kind: str, mesh: HeadMesh) -> Thing:
-        if not np.isfinite(mesh.vertices).all():
-            raise HeadError(f"{self._name}: what was made of {kind} has no finite shape")
         mesh = replace(mesh, vertices=np.round(mesh.vertices, DIGITS))
         self._count += 1  # a name of its own, by which a render worker knows it
         path = self._folder / f"{kind}-{self._count}.npz"

@@ -19,6 +19,7 @@ from generator.heads.mesh import HeadMesh, Material
 from generator.heads.package import save_package
 from generator.labels import LABELS
 from generator.landmarks.surface import Surface
+from generator.placing.rendering import read_image
 from generator.plan.passes import PAINTED_SAMPLES, SEGMENTATION
 from generator.plan.settings import Look
 from generator.plan.views import View, Views
@@ -112,3 +113,34 @@ def test_a_picture_that_is_missing_is_noticed(renderer: Renderer, tmp_path: Path
     path.with_name(f"{path.stem}.segmentation3.exr").unlink()
     with pytest.raises(WorkerError, match="a class of the segmentation is missing"):
         passes_from_blender(path, PAINTED, 500.0)
+
+
+def test_layers_of_the_head_itself_are_left_to_no_chance(renderer: Renderer, tmp_path: Path) -> None:
+    veils = [("skin", 40.0, 0.3), ("eyes", 20.0, 0.5), ("hair", 0.0, 0.4), ("clothes", -40.0, 1.0)]
+    plates = [plate(-300, 300, z, Material(label, label=label, opacity=share)) for label, z, share in veils]
+    whole = replace(
+        plates[0],
+        vertices=np.concatenate([one.vertices for one in plates]),
+        triangles=np.concatenate([one.triangles + 4 * k for k, one in enumerate(plates)]),
+        material_index=np.repeat(np.arange(len(plates), dtype=np.int32), 2),
+        materials=tuple(one.materials[0] for one in plates),
+    )
+    [found] = painted(renderer, tmp_path, whole, View((0, 0, 0), CAMERA, Look()))
+    left = 1.0
+    for label, _, share in veils:
+        assert np.allclose(found[f"segmentation.{label}"], left * share, atol=1e-3), label
+        left *= 1 - share
+
+
+def test_a_picture_of_as_many_samples_is_no_picture_of_classes(renderer: Renderer, tmp_path: Path) -> None:
+    """It may be taken on the stage on which passes were painted."""
+    view = View((30.0, 0.0, 0.0), CAMERA, Look(samples=PAINTED_SAMPLES))
+    save_package(box(), tmp_path / "head.npz")
+
+    def picture() -> np.ndarray:
+        return read_image(next(iter([*renderer.render(tmp_path / "head.npz", Views.of([view]))])))
+
+    before = picture()
+    [path] = renderer.render(tmp_path / "head.npz", Views.of([view]), passes=PAINTED)
+    passes_from_blender(path, PAINTED, CAMERA.distance_mm)
+    assert np.array_equal(picture(), before)

@@ -11,6 +11,7 @@ import pytest
 from small_builds import config_for, run
 
 from generator.dataset.format.passes import read_channels
+from generator.dataset.proof import pass_checks
 from generator.dataset.proof.pass_checks import segmentation_problem
 from generator.dataset.proof.verify import verify_dataset
 from generator.execution.replay import replay_samples
@@ -19,7 +20,9 @@ from generator.plan.passes import SEGMENTATION
 pytestmark = pytest.mark.slow
 
 
-def test_it_verifies_replays_and_knows_the_face(parametric_heads: Path, tmp_path: Path) -> None:
+def test_it_verifies_replays_and_knows_the_face(
+    parametric_heads: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     poses = {"yaw": [-30, 30, 60], "pitch": [0, 0, 10], "roll": [0, 0, 10]}
     passes = ["depth", "albedo", "segmentation"]
     root = tmp_path / "dataset"
@@ -34,6 +37,9 @@ def test_it_verifies_replays_and_knows_the_face(parametric_heads: Path, tmp_path
     theirs = pq.read_table(plain / "data").to_pylist()
     images, alone = ({r["sample_id"]: r["image_sha256"] for r in table} for table in (rows, theirs))
     assert images == alone, "passes change no image"
+    with monkeypatch.context() as patched:  # as if somebody had made hashes anew
+        patched.setattr(pass_checks, "segmentation_problem", lambda channels: "not so")
+        assert "not so" in verify_dataset(root, workers=1).text()
     for row in rows:
         channels = read_channels(root / row["passes_path"])
         exact = np.reshape(row["landmarks_exact"], (468, 3))

@@ -51,18 +51,18 @@ def kinds(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
 
 
-def reds(path: Path) -> int:
-    """Pixels of an image that are the plate's."""
+def reds(path: Path) -> np.ndarray:
+    """The pixels of an image that are the plate's, as [K, 2] (row, column)."""
     with Image.open(path) as image:
         red, green, blue = np.moveaxis(np.asarray(image.convert("RGB"), float), -1, 0)
-    return int(((red > 90) & (green < 20) & (blue < 20)).sum())
+    return np.argwhere((red > 90) & (green < 20) & (blue < 20))
 
 
 @pytest.mark.slow
 def test_it_hides_landmarks_or_is_left_out_and_verifies(parametric_heads: Path, tmp_path: Path) -> None:
     render = {
         "occluder": "choice:none,hand",
-        "occluder_x": "choice:0,0,1.5",
+        "occluder_x": "choice:0,0,0.6",
         "glasses": "choice:none,round,square",
     }
     config = config_for(
@@ -81,8 +81,14 @@ def test_it_hides_landmarks_or_is_left_out_and_verifies(parametric_heads: Path, 
     aside = np.array([r["look_occluder"] == "hand" and r["look_occluder_x"] > 0 for r in rows])
     assert before.any() and aside.any() and (~before).any()
     assert not nose[before].any() and nose[~before].all(), "a clear plate, or one aside, hides nothing"
-    red = np.array([reds(root / r["image_path"]) for r in rows])
-    assert red[before].min() > 100 and red[~(before | aside)].max() < 10
+    seen = [reds(root / r["image_path"]) for r in rows]
+    red = np.array([len(pixels) for pixels in seen])
+    assert red[before | aside].min() > 60 and red[~(before | aside)].max() < 10
+    exact = as_array(table.combine_chunks().to_batches()[0], "landmarks_exact")[:, 1].astype(float)
+    k = np.stack([r["camera"] for r in rows]).reshape(-1, 3, 3)
+    nose_x = exact[:, 0] / exact[:, 2] * k[:, 0, 0] + k[:, 0, 2]
+    right = np.array([pixels[:, 1].mean() if len(pixels) else np.nan for pixels in seen]) - nose_x
+    assert right[aside].min() > 10 and np.abs(right[before]).max() < 8, "moved to the right in the image, too"
     left_out = [r["look_left_out"] for r in rows]
     assert [bool(text) for text in left_out] == [r["look_glasses"] == "square" for r in rows]
     assert {*left_out} == {"", "glasses: they are too small"}

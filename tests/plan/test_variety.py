@@ -12,6 +12,7 @@ from generator.plan.config import config_toml, load_config, read_recorded
 from generator.plan.settings import Render, section_settings
 from generator.plan.variety import CHOICES, VARIETY
 from generator.plan.view_plan import plan_views
+from generator.plan.wear import STYLES
 
 POSES = [(float(yaw), 0.0, 0.0) for yaw in range(-30, 31, 5)]
 
@@ -58,3 +59,14 @@ def test_heads_fit_into_photographs_at_every_distance() -> None:
 def test_another_variety_is_no_choice() -> None:
     with pytest.raises(UsageError, match=r"render\.variety: Input should be 'none', 'photo' or 'all'"):
         load_config(None, {"render": {"variety": "much"}})
+
+
+def test_photo_wears_in_the_shares_that_it_says() -> None:
+    shares = {"glasses": 0.25, "mask": 0.06, "clothes": 0.9, "hair": 0.75, "occluder": 0.06}
+    for kind, share in shares.items():
+        texts = str(VARIETY["photo"][kind]).partition("choice:")[2].split(",")
+        worn = [text for text in texts if text != STYLES[kind][0]]
+        assert {*worn} == {*STYLES[kind][1:]} and len(worn) / len(texts) == pytest.approx(share, abs=0.08)
+    assert str(VARIETY["photo"]["hair"]).startswith("head:") and "head:" not in str(
+        VARIETY["photo"]["glasses"]
+    )
