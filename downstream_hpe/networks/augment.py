@@ -29,12 +29,12 @@ class Disturbances:
     stretch and depth relative.
     """
 
-    turn_deg: float = 4.0
+    turn_deg: float = 10.0
     mirror: float = 0.5
-    shape: float = 0.3
-    stretch: float = 0.03
+    shape: float = 1.0
+    stretch: float = 0.06
     depth: float = 0.04
-    lean: float = 0.015
+    lean: float = 0.03
     lens: float = 0.02
     jitter: float = 0.005
 

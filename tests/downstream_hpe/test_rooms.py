@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "predictor": {"prediction"},
 }
 TORCH = {"torch", "onnx"}
-WITH_TORCH = {"checkpoint", "export", "pose_network", "recipe", "samples", "training", "weights"}
+WITH_TORCH = {"checkpoint", "export", "pose_network", "recipe", "samples", "training", "weights", "rigid_fit"}
 """Modules of networks that need torch when they are imported."""
 
 
