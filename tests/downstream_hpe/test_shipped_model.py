@@ -32,11 +32,11 @@ def predictor():
 
 @pytest.fixture(scope="module")
 def seen(placed_head, renderer, detector, tmp_path_factory):
-    """Landmarks of a parametric head of another seed than the training's, and its canonical R_C."""
+    """Landmarks of a parametric head of another seed than the training's, and its level R_C."""
     folder = tmp_path_factory.mktemp("seen")
     mesh = read_mesh(placed_head.head, folder)
     placer = Placer(renderer, detector, folder, lambda head: mesh)
-    level = placer.subject([placed_head.head], "canonical").placement
+    level = placer.subject([placed_head.head], "level").placement
     package = folder / "head.npz"
     save_package(level.normalise(mesh), package)
     camera = framed_camera(Lens(resolution=256, lens_mm=60.0), level.radius_mm)
@@ -87,7 +87,8 @@ def test_a_photograph(predictor):
     yaw, pitch, roll = pose.ypr_deg[0]
     # She looks at the camera, her head turned a little to image left and leaning the same way.
     assert -5 < yaw < 20 and abs(pitch) < 15 and abs(roll) < 15
-    assert pose.confidence[0] > 0.5
+    # Of photographs a little more than half come within 5 degrees, and no face is said to be surer.
+    assert 0.4 < pose.confidence[0] < 0.8
 
 
 def test_it_is_small_and_says_where_it_comes_from(predictor):
