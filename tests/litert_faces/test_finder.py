@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.io import savemat
 
 from downstream_hpe import cli
 from downstream_hpe.errors import DataError, ModelError, UsageError
@@ -185,7 +186,7 @@ def test_a_small_face_and_one_on_its_side_are_looked_at_again(photograph):
         assert np.abs(ours - theirs).max() < 1.5
 
 
-def test_predict_with_each(photograph, tmp_path, monkeypatch, capfd):
+def test_predict_and_evaluate_with_each(photograph, tmp_path, monkeypatch, capfd):
     pytest.importorskip("onnxruntime")
     photograph.save(tmp_path / "a.png")
     found = {}
@@ -204,6 +205,19 @@ def test_predict_with_each(photograph, tmp_path, monkeypatch, capfd):
         if isinstance(value, float):
             assert found["litert"][name] == pytest.approx(value, rel=0.01, abs=0.02), name
     assert (Path(package).parent / MEDIAPIPE.points).is_file()
+    photograph.save(tmp_path / "a.jpg")
+    savemat(
+        tmp_path / "a.mat", {"Pose_Para": np.zeros((1, 3)), "pt3d_68": np.tile([[225.0], [120], [0]], 68)}
+    )
+    errors = {}
+    for detector in ("mediapipe", "litert"):
+        options = ["--format", "aflw2000", "--json", "--detector", detector]
+        monkeypatch.setattr(sys, "argv", ["downstream-hpe", "evaluate", "headturn", str(tmp_path), *options])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        assert not stopped.value.code
+        errors[detector] = json.loads(capfd.readouterr().out)[-1]["mae"]
+    assert errors["litert"] == pytest.approx(errors["mediapipe"], abs=0.01)
     for detector, says, code in (
         ("nose", "expected mediapipe, litert", 2),
         (str(tmp_path / "a.png"), "no zip", 1),
