@@ -161,6 +161,7 @@ MISTAKES = {
     ),
     "other ranks": (["fit", "nowhere", "--out", "m", "--ranks", "5,4,3,3"], 2, "only ID is free"),
     "no model": (["evaluate", "nowhere", "nowhere"], 1, "nowhere: no such model"),
+    "a detector of rows": (["evaluate", "m", "d", "--detector", "litert"], 2, "looks at photographs"),
     "nothing to export": (["export", "m"], 2, "nothing to write"),
     "export nothing": (["export", "m", "--onnx", "o"], 1, "not a readable model file"),
 }
