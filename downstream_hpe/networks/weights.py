@@ -19,7 +19,7 @@ from downstream_hpe.networks.pose_network import PoseNetwork, widths
 
 NETWORK_FILE = "network.safetensors"
 """Its name in a model folder."""
-FORMAT = "downstream-hpe network 2"
+FORMAT = "downstream-hpe network 3"
 _CONFIDENCE = "confidence."
 
 

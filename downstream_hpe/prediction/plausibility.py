@@ -66,6 +66,13 @@ class FaceShapes:
         """0 to 1, [N]. Arguments as :meth:`quantities`."""
         return expit(self.bias - self.quantities(landmarks) @ self.weights)
 
+    def share(self, landmarks: np.ndarray) -> np.ndarray:
+        """What is left of a confidence where faces are doubtful: 0 to 1, [N]. Arguments as above.
+
+        The root, so that half of what was seen counts: a doubtful face may still be placed well.
+        """
+        return np.sqrt(self.plausibility(landmarks))
+
 
 def quarter_turns(landmarks: np.ndarray) -> np.ndarray:
     """By how many quarter turns, clockwise in the picture, faces are from upright: int [N], 0 to 3.

@@ -43,9 +43,8 @@ def confidence():
     level = level_faces(landmarks, rotation_from_angles(ypr), "rms")
     landmarks, ypr = faces(1)
     features, estimate = normalise(landmarks).reshape(COUNT, -1), estimated(ypr, 2)
-    return calibrate(
-        level, RANGE, features, estimate, rotation_from_angles(estimate), rotation_from_angles(ypr)
-    )
+    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    return calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
 
 
 def test_what_it_says_comes_true(confidence):
@@ -90,5 +89,32 @@ def test_estimates_must_be_finite(confidence):
     landmarks, ypr = faces(9)
     level = (confidence.mean, confidence.basis, confidence.scale)
     features, nothing = landmarks.reshape(COUNT, -1), np.full((COUNT, 3), np.nan)
+    true = rotation_from_angles(ypr)
     with pytest.raises(ModelError, match="not finite"):
-        calibrate(level, RANGE, features, nothing, rotation_from_angles(ypr), rotation_from_angles(ypr))
+        calibrate(level, RANGE, features, nothing, true, true, np.ones(COUNT))
+
+
+def test_a_few_rows_decide_nothing(confidence):
+    """Ten estimates beyond the range, all wrong, do not make those a little beyond it hopeless."""
+    landmarks, ypr = faces(10)
+    level = (confidence.mean, confidence.basis, confidence.scale)
+    estimate = estimated(ypr, 11)
+    estimate[:10] = [0, 0, 35]
+    features = normalise(landmarks).reshape(COUNT, -1)
+    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    again = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
+    assert again.weights[-1] < 1000
+
+
+def test_what_plausibility_takes_is_not_taken_twice(confidence):
+    """The graph's probability times the share is what comes true, so the graph alone says more."""
+    landmarks, ypr = faces(12)
+    level = (confidence.mean, confidence.basis, confidence.scale)
+    estimate = ypr + np.random.default_rng(13).normal(scale=3.5, size=ypr.shape)
+    share = np.full(COUNT, 0.8)
+    features = normalise(landmarks).reshape(COUNT, -1)
+    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    graph = calibrate(level, RANGE, features, estimate, found, true, share).of(features, estimate, found)
+    plain = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
+    assert graph.mean() > plain.of(features, estimate, found).mean() + 0.02
+    assert (0.8 * graph).mean() == pytest.approx((geodesic_errors(found, true) < 5).mean(), abs=0.1)

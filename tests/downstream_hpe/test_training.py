@@ -136,7 +136,8 @@ def confidence(rows):
     estimates = some.ypr_deg + rng.normal(scale=3, size=(300, 3))
     features = normalise(some.landmarks).reshape(300, -1)
     faces = level_faces(rows.landmarks, rows.rotation, "rms")
-    return calibrate(faces, RANGE, features, estimates, rotation_from_angles(estimates), some.rotation)
+    rotation = rotation_from_angles(estimates)
+    return calibrate(faces, RANGE, features, estimates, rotation, some.rotation, np.ones(300))
 
 
 @pytest.mark.parametrize("normalisation", ["rms", "eyes"])
@@ -186,7 +187,7 @@ def test_saved_models_come_back(rows, model, confidence, tmp_path):
     again = TensorModel.load(tmp_path / "t.safetensors")
     found = again.estimator().from_landmarks(rows.landmarks[:20])
     assert np.abs(found.ypr_deg - rows.ypr_deg[:20]).max() < 0.01
-    with pytest.raises(ModelError, match="expected 'downstream-hpe network 2'"):
+    with pytest.raises(ModelError, match="expected 'downstream-hpe network 3'"):
         Weights.load(tmp_path / "t.safetensors")
 
 
