@@ -76,6 +76,24 @@ def available_cores() -> list[int]:
 
 
 @contextmanager
+def few_cores(count: int) -> Iterator[None]:
+    """A block in which this process may use so many of its cores, 0 for all; on Linux alone.
+
+    A library that counts them while it is loaded starts no more threads than that, ever after.
+    """
+    if not count or sys.platform != "linux":
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(before)[:count])
+    try:
+        yield
+    finally:
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), before)
+
+
+@contextmanager
 def native_silence(*streams: int) -> Iterator[None]:
     """What native code writes to stderr, or to these streams by their numbers, is lost; Python's own
     messages are not meant to come in between."""

@@ -72,7 +72,7 @@ def dressed(fit: Fit, things: dict[str, str], seed: int, shift: np.ndarray, fold
         start = time.perf_counter()
         try:
             rng = np.random.default_rng([seed, number])
-            made = maker.make(replace(fit, others=others), style, rng)
+            made = maker.make(fit.beside(others), style, rng)
         except CannotWear as reason:
             print(f"{kind}:{style}: {reason}", file=sys.stderr)
             continue

@@ -1,44 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fast preset's light: groups of nodes that all materials of a stage share, set once an image.
+"""The fast preset's light: groups of nodes that all materials of a stage share.
 
 No ray is traced beyond the first hit, so the image has no noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from functools import cached_property
 from typing import NamedTuple
 
 import bpy
 
-from generator.blender.environment import form_of, set_form
-from generator.blender.lamps import key_direction, key_strengths, lamp_light
+from generator.blender.lamps import key_direction, key_strengths
+from generator.blender.light_maps import AMBIENT, DIRECT, FACING
+from generator.blender.map_nodes import Lit, MapNodes, place_in
 from generator.blender.needs import Needs
-from generator.blender.nodes import BLACK, math_node, scaled, vector_node
-from generator.blender.shine import set_lamp, set_surroundings, shine
+from generator.blender.nodes import apart, math_node, scaled, vector_node
+from generator.heads.shine import Kind
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
-
-LIGHT = "light"
-"""Output of the group: what a white surface sends back."""
-
-SHINE = "shine"
-"""Output of the group: what a surface mirrors, whatever its colour."""
-
-NORMAL, GLOSS = "normal", "gloss"
-"""Inputs of the group."""
 
 OPENNESS = "openness"
 """Attribute of vertices, see :mod:`generator.landmarks.occlusion`."""
 
-_KEY, _STRENGTH, _AMBIENT, _OPENNESS = "key", "strength", "ambient", "occlusion"
-_IRRADIANCE, _SUN, _COLOR = "irradiance", "sun", "colour of "
-
-Color = tuple[float, float, float]
+_KEY, _STRENGTH = "key", "strength"
 
 
-class Lit(NamedTuple):
+class Sent(NamedTuple):
     """light: what a white surface sends back. shine: what is mirrored, None without gloss."""
 
     light: bpy.types.NodeSocket
@@ -46,196 +35,125 @@ class Lit(NamedTuple):
 
 
 class FastLight:
-    """The light of a stage: with nodes for what it needs, and no others, but for what glossy materials need.
-
-    Whatever a stage has nodes for beyond what a look needs changes no pixel: a factor is then 1, a summand 0.
-    """
+    """The light of a stage. A key light alone is computed; all else, and what shines, is looked up."""
 
     def __init__(self, needs: Needs) -> None:
         self.needs = needs
-        self._groups: dict[bool, _Group] = {}
+        self._glossy: dict[bool, bpy.types.NodeTree] = {}
+        self._key: bpy.types.NodeTree | None = None
 
-    def into(self, tree: bpy.types.NodeTree, normal: bpy.types.NodeSocket | None, glossy: bool) -> Lit:
+    @cached_property
+    def _maps(self) -> MapNodes:
+        return MapNodes()
+
+    def into(self, tree: bpy.types.NodeTree, normal: bpy.types.NodeSocket | None, gloss: Kind) -> Sent:
         """What a surface sends back, in the nodes of a material. normal: that of the mesh, if there is no
-        other. glossy: it has a gloss, in some look."""
-        if glossy not in self._groups:
-            self._groups[glossy] = _Group(self.needs, glossy)
+        other. gloss: what decides it; 0 has none in any look."""
         normal = normal or tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
         node = tree.nodes.new("ShaderNodeGroup")
-        node.node_tree, node.name = self._groups[glossy].tree, LIGHT
-        tree.links.new(normal, node.inputs[NORMAL])
-        return Lit(node.outputs[LIGHT], node.outputs[SHINE] if glossy else None)
-
-    def set(self, look: Look, environment: EnvironmentLight | None) -> None:
-        """Make it that of a look, and of an environment where there is one."""
-        for group in self._groups.values():
-            group.set(look, environment)
-
-
-class _Group:
-    """The nodes. glossy: with those for what a surface mirrors."""
-
-    def __init__(self, needs: Needs, glossy: bool) -> None:
-        self._needs, self._glossy = needs, glossy
-        self._lamps = tuple(f"lamp {k}" for k in range(needs.lamps))
-        self.tree = tree = bpy.data.node_groups.new(LIGHT, "ShaderNodeTree")
-        tree.interface.new_socket(NORMAL, in_out="INPUT", socket_type="NodeSocketVector")
-        tree.interface.new_socket(LIGHT, in_out="OUTPUT", socket_type="NodeSocketVector")
-        if glossy:
-            tree.interface.new_socket(GLOSS, in_out="INPUT", socket_type="NodeSocketFloat")
-            tree.interface.new_socket(SHINE, in_out="OUTPUT", socket_type="NodeSocketVector")
-        given, out = tree.nodes.new("NodeGroupInput").outputs, tree.nodes.new("NodeGroupOutput").inputs
-        shares = _shares(tree) if needs.occlusion else None
-        light = _key_light(tree, given[NORMAL], shares)
-        if needs.environment:
-            light = _environment_light(tree, given[NORMAL], shares, light)
-        for name in self._lamps:
-            # Each by itself: of black, Cycles leaves out all that comes before it.
-            light = vector_node(tree, "ADD", light, _lamp(tree, given[NORMAL], shares, name))
-        tree.links.new(light, out[LIGHT])
-        if glossy:
-            suns = (_SUN,) if needs.environment else ()
-            seen = shine(
-                tree,
-                given[NORMAL],
-                given[GLOSS],
-                (_KEY, *suns, *self._lamps),
-                environment=needs.environment,
-                share=shares.direct if shares else None,
-            )
-            tree.links.new(seen, out[SHINE])
-
-    def set(self, look: Look, environment: EnvironmentLight | None) -> None:
-        """See :class:`FastLight`."""
-        with _apart(self.tree):
-            self._set(look, environment)
-
-    def _set(self, look: Look, environment: EnvironmentLight | None) -> None:
-        nodes = self.tree.nodes
-        key, ambient = key_strengths(look, environment)
-        nodes[_STRENGTH].inputs[1].default_value = key
-        nodes[_KEY].inputs[1].default_value = key_direction(look)
-        self._mirror(_KEY, key_direction(look), (key, key, key))
-        if self._needs.occlusion:
-            nodes[_OPENNESS].inputs[1].default_value = look.occlusion
-            nodes[_OPENNESS].inputs[2].default_value = 1.0 - look.occlusion
-            nodes[_AMBIENT].inputs[1].default_value = ambient
+        if not gloss and not self.needs.maps:
+            self._key = self._key or _key_light()
+            node.node_tree = self._key
         else:
-            nodes[_STRENGTH].inputs[2].default_value = ambient
-        if self._needs.environment:
-            set_form(nodes, _IRRADIANCE, environment)
-            sun = (environment.direction, environment.sun) if environment else (BLACK, BLACK)
-            self._set_lamp(_SUN, *sun)
-        dark = [(BLACK, BLACK)] * len(self._lamps)
-        for name, lamp in zip(self._lamps, [*map(lamp_light, look.lamps), *dark], strict=False):
-            self._set_lamp(name, *lamp)
-        if self._glossy:
-            set_surroundings(nodes, ambient, environment, self._needs.environment)
+            node.node_tree = self._looked_up(bool(gloss))
+        tree.links.new(normal, node.inputs[0])
+        if gloss:
+            tile = self._maps.shine(gloss)
+            node.inputs[1].default_value, node.inputs[2].default_value = (
+                (*tile.scale, 0.0),
+                (*tile.middle, 0.0),
+            )
+        return Sent(node.outputs[0], node.outputs[1] if gloss else None)
 
-    def _set_lamp(self, name: str, direction: Color, color: Color) -> None:
-        self.tree.nodes[name].inputs[1].default_value = direction
-        self.tree.nodes[_COLOR + name].inputs[1].default_value = color
-        self._mirror(name, direction, color)
+    def expect(self, looks: Iterable[Lit]) -> None:
+        """What is shown next, in order."""
+        if self.needs.maps or self._glossy:
+            self._maps.expect(looks)
 
-    def _mirror(self, name: str, direction: Color, color: Color) -> None:
-        if self._glossy:
-            set_lamp(self.tree.nodes, name, direction, color)
+    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
+        """Make it that of a look, and of an environment where there is one; which of the sheets it is."""
+        if self._key is not None:
+            with apart(self._key):
+                nodes = self._key.nodes
+                nodes[_STRENGTH].inputs[1].default_value, nodes[_STRENGTH].inputs[2].default_value = (
+                    key_strengths(look, environment)
+                )
+                nodes[_KEY].inputs[1].default_value = key_direction(look)
+        return self._maps.sheet(look, environment) if self._glossy else 0
 
-
-@contextmanager
-def _apart(tree: bpy.types.NodeTree) -> Iterator[None]:
-    """Have a group's outputs unlinked meanwhile: with them Blender tells every material that uses it of every
-    number that is set."""
-    [out] = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
-    links = [(link.from_socket, link.to_socket) for one in out.inputs for link in one.links]
-    for _, to in links:
-        tree.links.remove(to.links[0])
-    try:
-        yield
-    finally:
-        for link in links:
-            tree.links.new(*link)
+    def _looked_up(self, glossy: bool) -> bpy.types.NodeTree:
+        if glossy not in self._glossy:
+            self._glossy[glossy] = _looked_up(self._maps, self.needs.occlusion, glossy)
+        return self._glossy[glossy]
 
 
-class _Shares(NamedTuple):
-    """What of ambient and of direct light is not kept out."""
-
-    ambient: bpy.types.NodeSocket
-    direct: bpy.types.NodeSocket
-
-
-def _shares(tree: bpy.types.NodeTree) -> _Shares:
-    """1 - occlusion (1 - openness), and 2 of its square.
-
-    Who sees little of the surroundings sees little of a lamp: the aperture of Chan, "Material advances in
-    Call of Duty: WWII" (SIGGRAPH 2018), here for lamps in all directions alike.
-    """
-    vertex = tree.nodes.new("ShaderNodeAttribute")
-    vertex.attribute_name = OPENNESS
-    ambient = math_node(tree, "MULTIPLY_ADD", vertex.outputs["Fac"])
-    ambient.node.name = _OPENNESS
-    direct = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", ambient, ambient), 2.0)
-    direct.node.use_clamp = True
-    return _Shares(ambient, direct)
-
-
-def _key_light(
-    tree: bpy.types.NodeTree, normal: bpy.types.NodeSocket, shares: _Shares | None
-) -> bpy.types.NodeSocket:
+def _key_light() -> bpy.types.NodeTree:
     """ambient + key x half-Lambert(normal . light), a number.
 
     Half-Lambert (Mitchell et al., "Illustrative rendering in Team Fortress 2", 2007) keeps the shadow side
     readable.
     """
-    dot = _towards(tree, normal, _KEY)
-    wrapped = math_node(tree, "MULTIPLY_ADD", dot, 0.5, 0.5)
-    squared = math_node(tree, "MULTIPLY", wrapped, wrapped)
-    if shares is None:
-        light = math_node(tree, "MULTIPLY_ADD", squared)
-    else:
-        ambient = math_node(tree, "MULTIPLY", shares.ambient)
-        ambient.node.name = _AMBIENT
-        squared = math_node(tree, "MULTIPLY", squared, shares.direct)
-        light = math_node(tree, "MULTIPLY_ADD", squared, 1.0, ambient)
-    light.node.name = _STRENGTH
-    return light
-
-
-def _environment_light(
-    tree: bpy.types.NodeTree,
-    normal: bpy.types.NodeSocket,
-    shares: _Shares | None,
-    more: bpy.types.NodeSocket,
-) -> bpy.types.NodeSocket:
-    """That of a panorama, and its sun, and more."""
-    light = form_of(tree, normal, _IRRADIANCE)
-    if shares is not None:
-        light = scaled(tree, light, shares.ambient)
-    return vector_node(tree, "ADD", _lamp(tree, normal, shares, _SUN, light), more)
-
-
-def _lamp(
-    tree: bpy.types.NodeTree,
-    normal: bpy.types.NodeSocket,
-    shares: _Shares | None,
-    name: str,
-    more: bpy.types.NodeSocket | None = None,
-) -> bpy.types.NodeSocket:
-    """That of a lamp, and more."""
-    cosine = math_node(tree, "MAXIMUM", _towards(tree, normal, name), 0.0)
-    if shares is not None:
-        cosine = math_node(tree, "MULTIPLY", cosine, shares.direct)
-    if more is None:
-        light = vector_node(tree, "MULTIPLY", cosine, None)
-    else:
-        light = vector_node(tree, "MULTIPLY_ADD", cosine, None, more)
-    light.node.name = _COLOR + name
-    return light
-
-
-def _towards(tree: bpy.types.NodeTree, direction: bpy.types.NodeSocket, name: str) -> bpy.types.NodeSocket:
-    """The cosine of a direction with the constant of a node of that name."""
+    tree = _group("key light", glossy=False)
+    given, out = tree.nodes.new("NodeGroupInput").outputs, tree.nodes.new("NodeGroupOutput").inputs
     dot = tree.nodes.new("ShaderNodeVectorMath")
-    dot.operation, dot.name = "DOT_PRODUCT", name
-    tree.links.new(direction, dot.inputs[0])
-    return dot.outputs["Value"]
+    dot.operation, dot.name = "DOT_PRODUCT", _KEY
+    tree.links.new(given[0], dot.inputs[0])
+    wrapped = math_node(tree, "MULTIPLY_ADD", dot.outputs["Value"], 0.5, 0.5)
+    light = math_node(tree, "MULTIPLY_ADD", math_node(tree, "MULTIPLY", wrapped, wrapped))
+    light.node.name = _STRENGTH
+    tree.links.new(light, out[0])
+    return tree
+
+
+def _looked_up(maps: MapNodes, occlusion: bool, glossy: bool) -> bpy.types.NodeTree:
+    """ambient (normal) x what is not kept out + direct (normal) x 2 of its square, and what is mirrored.
+
+    Who sees little of the surroundings sees little of a lamp: the aperture of Chan, "Material advances in
+    Call of Duty: WWII" (SIGGRAPH 2018), here for lamps in all directions alike.
+    """
+    tree = _group("looked up", glossy=glossy)
+    given, out = tree.nodes.new("NodeGroupInput").outputs, tree.nodes.new("NodeGroupOutput").inputs
+    place = place_in(tree, given[0], AMBIENT)
+    ambient, share = maps.look_up(tree, place)
+    beside = vector_node(tree, "ADD", place, None)
+    beside.node.inputs[1].default_value = (DIRECT.x - AMBIENT.x, DIRECT.y - AMBIENT.y, 0.0)
+    direct, _ = maps.look_up(tree, beside)
+    mirrored = _mirrored(tree, maps, given) if glossy else None
+    if occlusion:
+        vertex = tree.nodes.new("ShaderNodeAttribute")
+        vertex.attribute_name = OPENNESS
+        closed = math_node(tree, "SUBTRACT", 1.0, vertex.outputs["Fac"])
+        left = math_node(tree, "SUBTRACT", 1.0, math_node(tree, "MULTIPLY", share, closed))
+        lamps = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", left, left), 2.0)
+        lamps.node.use_clamp = True
+        ambient, direct = scaled(tree, ambient, left), scaled(tree, direct, lamps)
+        mirrored = scaled(tree, mirrored, lamps) if mirrored else None
+    tree.links.new(vector_node(tree, "ADD", ambient, direct), out[0])
+    if mirrored:
+        tree.links.new(mirrored, out[1])
+    return tree
+
+
+def _mirrored(tree: bpy.types.NodeTree, maps: MapNodes, given: bpy.types.NodeInputs) -> bpy.types.NodeSocket:
+    """What a surface mirrors: what comes from there, times Schlick's term."""
+    view = tree.nodes.new("ShaderNodeNewGeometry").outputs["Incoming"]
+    reverse = vector_node(tree, "REFLECT", view, given[0])
+    seen, rim = maps.look_up(tree, place_in(tree, reverse, given[1], given[2]))
+    facing = tree.nodes.new("ShaderNodeVectorMath")
+    facing.operation = "DOT_PRODUCT"
+    tree.links.new(given[0], facing.inputs[0])
+    tree.links.new(view, facing.inputs[1])
+    away = math_node(tree, "SUBTRACT", 1.0, facing.outputs["Value"])
+    away.node.use_clamp = True
+    rise = math_node(tree, "SUBTRACT", rim, FACING)
+    share = math_node(tree, "MULTIPLY_ADD", math_node(tree, "POWER", away, 5.0), rise, FACING)
+    return scaled(tree, seen, share)
+
+
+def _group(name: str, *, glossy: bool) -> bpy.types.NodeTree:
+    tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    for given in ("normal", "scale", "middle") if glossy else ("normal",):
+        tree.interface.new_socket(given, in_out="INPUT", socket_type="NodeSocketVector")
+    for made in ("light", "shine") if glossy else ("light",):
+        tree.interface.new_socket(made, in_out="OUTPUT", socket_type="NodeSocketVector")
+    return tree

@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from generator.blender.fast_light import FastLight
 from generator.blender.lamps import key_direction, key_strengths, lamp_light
-from generator.blender.materials import set_look, srgb_to_linear
+from generator.blender.materials import srgb_to_linear
 from generator.blender.needs import Needs
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
@@ -24,17 +24,8 @@ SUN_DIAMETER = math.radians(25.0)
 class Light(Protocol):
     """The light of a stage."""
 
-    def add(self, materials: Sequence[bpy.types.Material]) -> None:
-        """Light these, too: the fast preset's compute their light."""
-        ...
-
-    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
-        """No longer."""
-        ...
-
-    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
-        """Make it that of a look, and of an environment where there is one. pixel_mm: what a pixel covers on
-        the head."""
+    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
+        """Make it that of a look, and of an environment where there is one; which sheet of maps has it."""
         ...
 
 
@@ -52,50 +43,27 @@ def build_light(scene: bpy.types.Scene, needs: Needs, fast: FastLight | None) ->
     return LightInScene(scene, world, needs)
 
 
-class _Materials:
-    """What is lit: gloss and relief are set with the light."""
-
-    def __init__(self) -> None:
-        self._materials: list[bpy.types.Material] = []
-
-    def add(self, materials: Sequence[bpy.types.Material]) -> None:
-        """See :class:`Light`."""
-        self._materials += materials
-
-    def drop(self, materials: Sequence[bpy.types.Material]) -> None:
-        """See :class:`Light`."""
-        self._materials = [material for material in self._materials if material not in materials]
-
-    def set_looks(self, look: Look, pixel_mm: float) -> None:
-        """Make them those of a look."""
-        for material in self._materials:
-            set_look(material, look, pixel_mm)
-
-
-class LightInMaterials(_Materials):
+class LightInMaterials:
     """The fast preset: every material computes light from the normal."""
 
     def __init__(self, world: bpy.types.World, fast: FastLight) -> None:
-        super().__init__()
         tree = world.node_tree
         output = tree.nodes.new("ShaderNodeOutputWorld")
         self._background = tree.nodes.new("ShaderNodeBackground")
         tree.links.new(self._background.outputs[0], output.inputs["Surface"])
         self._fast = fast
 
-    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
+    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
-        self._fast.set(look, environment)
-        self.set_looks(look, pixel_mm)
+        return self._fast.set(look, environment)
 
 
-class LightInScene(_Materials):
+class LightInScene:
     """The quality preset: suns, and surroundings that are white, or a panorama, whatever colour the camera
     sees behind the head."""
 
     def __init__(self, scene: bpy.types.Scene, world: bpy.types.World, needs: Needs) -> None:
-        super().__init__()
         tree = world.node_tree
         output = tree.nodes.new("ShaderNodeOutputWorld")
         self._background = tree.nodes.new("ShaderNodeBackground")
@@ -115,7 +83,7 @@ class LightInScene(_Materials):
         self._key = _sun(scene, "key")
         self._lamps = [_sun(scene, "lamp") for _ in range(needs.lamps)]
 
-    def set(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
+    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
         key, ambient = key_strengths(look, environment)
@@ -125,7 +93,7 @@ class LightInScene(_Materials):
         _shine_from(self._key, key_direction(look), (key, key, key))
         for lamp, given in zip(self._lamps, look.lamps, strict=True):
             _shine_from(lamp, *lamp_light(given))
-        self.set_looks(look, pixel_mm)
+        return 0
 
 
 def _sun(scene: bpy.types.Scene, name: str) -> bpy.types.Object:

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import bpy
 
-from generator.blender.fast_light import GLOSS, LIGHT, FastLight
+from generator.blender.fast_light import FastLight
 from generator.blender.label_group import labels_group
 from generator.blender.needs import Needs
 from generator.blender.nodes import math_node, scaled, vector_node
-from generator.blender.skin import Skin, has_relief, relief, set_relief
+from generator.blender.skin import Skin, relief
 from generator.heads.mesh import Material
-from generator.heads.shine import gloss_of, is_skin
+from generator.heads.shine import Kind, gloss_of, is_skin, kind_of_gloss
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 from generator.labels import LABELS
-from generator.plan.settings import Look
 
 VERTEX_COLORS = "Color"
 UV_MAP = "UVMap"
@@ -39,7 +38,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 CLEAREST = 0.02
 """Opacity of a material that is clearer than that."""
 
-_LABEL, _GLOSS = "headturn_label", "headturn_gloss"
+_GLOSS = "headturn_gloss"
 
 
 LIT, ALBEDO, LABELLED = "lit", "albedo", "labelled"
@@ -55,7 +54,7 @@ def build_material(
     Raises FileNotFoundError or RuntimeError if the texture cannot be read.
     """
     made = bpy.data.materials.new(material.name)
-    made[_LABEL], made[_GLOSS] = material.label, material.gloss
+    made[_GLOSS] = kind_of_gloss(material)
     made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()
@@ -143,23 +142,11 @@ def _load_image(path: Path) -> bpy.types.Image:
     return image
 
 
-def set_look(made: bpy.types.Material, look: Look, pixel_mm: float) -> None:
-    """Make a material's gloss and relief those of a look. pixel_mm: what a pixel covers on the head."""
-    _set_gloss(made, look.gloss)
-    if has_relief(made.node_tree):
-        set_relief(made.node_tree, look.skin_detail, pixel_mm)
-
-
-def _set_gloss(made: bpy.types.Material, skin: float) -> None:
-    """Give a material the gloss that it has where the skin has so much."""
-    gloss = gloss_of(Material(made.name, label=made[_LABEL], gloss=made[_GLOSS]), skin)
-    nodes = made.node_tree.nodes
-    if LIGHT in nodes:
-        if GLOSS in nodes[LIGHT].inputs:
-            nodes[LIGHT].inputs[GLOSS].default_value = gloss
-        return
+def set_gloss(made: bpy.types.Material, skin: float) -> None:
+    """Give a material that is path traced the gloss that it has where the skin has so much."""
+    gloss = gloss_of(made[_GLOSS], skin)
     level, roughness = (GLOSSY, max(LEAST_ROUGHNESS, 1 - gloss)) if gloss else MATT
-    [principled] = [node for node in nodes if node.type == "BSDF_PRINCIPLED"]
+    [principled] = [node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED"]
     principled.inputs["Specular IOR Level"].default_value = level
     principled.inputs["Roughness"].default_value = roughness
 
@@ -191,7 +178,10 @@ def _lit_by_normal(
 ) -> bpy.types.NodeSocket:
     """Emission = colour x what a white surface of this normal sends back, and what it mirrors."""
     emission = tree.nodes.new("ShaderNodeEmission")
-    lit = fast.into(tree, skin.normal, gloss_of(material, 1.0 if fast.needs.gloss else 0.0) > 0)
+    gloss: Kind = kind_of_gloss(material)
+    if isinstance(gloss, str) and not fast.needs.gloss:
+        gloss = 0.0
+    lit = fast.into(tree, skin.normal, gloss)
     sent = _times(tree, skin.color, lit.light)
     if lit.shine is not None:
         mirrored = lit.shine

@@ -28,12 +28,19 @@ class Needs:
         occlusion = look.preset == "fast" and look.occlusion > 0
         return cls(environment, occlusion, len(look.lamps), look.gloss > 0, look.skin_detail > 0)
 
+    @property
+    def maps(self) -> bool:
+        """Does light come from more than a key light, so that the fast preset looks it up?"""
+        return self.environment or self.occlusion or self.lamps > 0 or self.gloss
+
     def cover(self, others: Needs) -> bool:
         """Is there a node for all that others need, and none that changes their pixels? Relief does: a normal
-        that is leaned by nothing and made a unit again has other digits."""
+        that is leaned by nothing and made a unit again has other digits, as has light that is looked up."""
         more = all(mine >= other for mine, other in zip(astuple(self), astuple(others), strict=True))
-        return more and self.relief == others.relief
+        return more and self.relief == others.relief and self.maps == others.maps
 
     def __or__(self, others: Needs) -> Needs:
-        """What one or the other needs; the relief of the first."""
+        """What one or the other needs; the relief of the first, which alone counts where one has no maps."""
+        if self.maps != others.maps:
+            return self
         return replace(Needs(*map(max, astuple(self), astuple(others))), relief=self.relief)

@@ -3,9 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 
 BLACK = (0.0, 0.0, 0.0)
+
+SHEET, OCTAVES, LEAN = "Red", "Green", "Blue"
+"""Numbers that are no colour: the colour of an object is what Blender tells its materials without compiling
+them again."""
 
 
 def math_node(
@@ -44,3 +51,25 @@ def vector_node(
         else:
             tree.links.new(value, socket)
     return node.outputs[0]
+
+
+def of_object(tree: bpy.types.NodeTree, number: str) -> bpy.types.NodeSocket:
+    """SHEET, OCTAVES or LEAN of the object that is seen."""
+    split = tree.nodes.new("ShaderNodeSeparateColor")
+    tree.links.new(tree.nodes.new("ShaderNodeObjectInfo").outputs["Color"], split.inputs[0])
+    return split.outputs[number]
+
+
+@contextmanager
+def apart(tree: bpy.types.NodeTree) -> Iterator[None]:
+    """Have a group's outputs unlinked meanwhile: with them Blender tells every material that uses it of every
+    number that is set."""
+    [out] = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
+    links = [(link.from_socket, link.to_socket) for one in out.inputs for link in one.links]
+    for _, to in links:
+        tree.links.remove(to.links[0])
+    try:
+        yield
+    finally:
+        for link in links:
+            tree.links.new(*link)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -11,8 +11,9 @@ from mathutils import Matrix
 
 from generator.blender.fast_light import OPENNESS, FastLight
 from generator.blender.light import Light, build_light
-from generator.blender.materials import UV_MAP, VERTEX_COLORS, build_material
+from generator.blender.materials import UV_MAP, VERTEX_COLORS, build_material, set_gloss
 from generator.blender.needs import Needs
+from generator.blender.skin import relief_of
 from generator.geometry.camera import SENSOR_MM, Camera
 from generator.geometry.rotation import (
     BLENDER_FROM_GRAPHICS,
@@ -27,6 +28,9 @@ from generator.plan.wear import Worn
 
 METRES = 1e-3
 """Blender units (metres) in a millimetre."""
+
+AWAY = Matrix.Translation((0.0, -1000.0, 0.0))
+"""Far behind the camera, where no ray comes near."""
 
 QUALITY_BOUNCES = 2
 
@@ -66,7 +70,6 @@ class Stage:
         for thing in own:
             scene.collection.objects.link(thing)
         self._light: Light = build_light(scene, self.needs, self._fast)
-        self._light.add(list(self.head.data.materials))
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(self._camera)
         scene.camera = self._camera
@@ -109,8 +112,13 @@ class Stage:
         pixel_mm = view.camera.view_mm / view.camera.width if view.look.skin_detail else 1.0
         lit = view.look, environment, pixel_mm
         if lit != self._lit:
-            self._light.set(*lit)
+            self._set_light(view.look, environment, pixel_mm)
             self._lit = lit
+
+    def expect(self, looks: Iterable[tuple[Look, EnvironmentLight | None]]) -> None:
+        """What is shown next, in order: it takes less time, and is the same."""
+        if self._fast is not None:
+            self._fast.expect(looks)
 
     def see_through_all(self) -> None:
         """Leave nothing to chance of what is seen through several layers; a head alone always did."""
@@ -125,6 +133,9 @@ class Stage:
         for package, mesh in worn.items():
             if package not in self._worn:
                 self._worn[package] = self._make("worn", mesh)
+                for thing in self._worn[package]:
+                    self.scene.collection.objects.link(thing)
+                self._worn[package][0].matrix_world = AWAY
 
     @property
     def objects(self) -> list[bpy.types.Object]:
@@ -136,20 +147,23 @@ class Stage:
         """The head, and what it wears in some view."""
         return [self.head, *(thing[0] for thing in self._worn.values())]
 
+    def _set_light(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
+        sheet = self._light.set(look, environment)
+        for thing in self.objects:
+            thing.color = (sheet, *relief_of(look.skin_detail, pixel_mm), 1.0)
+            if self._fast is None:
+                for material in thing.data.materials:
+                    set_gloss(material, look.gloss)
+
     def _put_on(self, packages: Sequence[str]) -> None:
         """Have these things in the scene, and no others: each costs an image time, seen or not."""
         for package in [*self._on]:
             if package not in packages:
                 self._on.remove(package)
-                for thing in self._worn[package]:
-                    self.scene.collection.objects.unlink(thing)
-                self._light.drop(list(self._worn[package][0].data.materials))
+                self._worn[package][0].matrix_world = AWAY
         for package in packages:
             if package not in self._on:
                 self._on.append(package)
-                for thing in self._worn[package]:
-                    self.scene.collection.objects.link(thing)
-                self._light.add(list(self._worn[package][0].data.materials))
                 self._lit = None
 
     def _make(self, name: str, mesh: HeadMesh) -> list[bpy.types.Object]:
@@ -215,6 +229,7 @@ def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
     """
     twin = bpy.data.objects.new("twin", head.data)
     set_seen(twin, False)
+    twin.matrix_world = AWAY
     return twin
 
 

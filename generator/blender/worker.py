@@ -43,10 +43,17 @@ def _import_package_beside_this_file() -> None:
 if "generator" not in sys.modules and not __package__:
     _import_package_beside_this_file()
 
-from generator.process import end_with_parent, limited_memory  # noqa: E402
+from generator.process import end_with_parent, few_cores, limited_memory  # noqa: E402
+
+WORDS = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+THREADS = int(WORDS[0]) if __name__ == "__main__" and WORDS else 0
 
 if __name__ == "__main__":
     end_with_parent()  # before bpy, which takes a second to load: its host may die in it
+
+# A thread for every core that Blender counts now would spin while the one of a frame works.
+with few_cores(THREADS):
+    import bpy  # noqa: F401
 
 from generator.blender import compat  # noqa: E402
 from generator.blender.clearing import clear  # noqa: E402
@@ -108,6 +115,7 @@ class RenderWorker:
         if order.passes:
             self._render_passes(self._images, order, answer)
             return
+        self._images.expect(order.views, order.lights)
         for place, view in enumerate(order.views):
             path = Path(order.out) / f"{place:06d}.{order.format}"
             environment = order.lights[place] if order.lights else None
@@ -169,5 +177,4 @@ def _named(order: Any) -> str:
 
 
 if __name__ == "__main__":
-    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
-    main(threads=int(words[0]) if words else 0)
+    main(THREADS)

@@ -12,19 +12,29 @@ WET = {EYES: 0.9, TEETH: 0.75}
 WORN = frozenset({HAIR, GLASSES, HEADWEAR, CLOTHES, MASK, OCCLUDER})
 """What is put on a head says itself how much it shines."""
 
+Kind = float | str
+"""What decides a gloss: a material's own, or the class that it is of."""
+
 
 def is_skin(material: Material) -> bool:
     """Is it a head's skin, all or some of it?"""
     return material.label not in WORN and named(material.name) == SKIN
 
 
-def gloss_of(material: Material, skin: float) -> float:
-    """0 (matt) to 1 of a material where the skin has so much: its own, if it has one.
+def kind_of_gloss(material: Material) -> Kind:
+    """A material's own gloss, if it has one, SKIN, one of WET, or 0.
 
     A head's materials say what they are by their names, whatever labels they have where somebody asked for
     the pass segmentation, which changes no picture.
     """
-    if material.gloss or not skin or material.label in WORN:
+    if material.gloss or material.label in WORN:
         return material.gloss
     what = named(material.name)
-    return skin if what == SKIN else WET.get(what, 0.0)
+    return what if what == SKIN or what in WET else 0.0
+
+
+def gloss_of(kind: Kind, skin: float) -> float:
+    """0 (matt) to 1 of a kind where the skin has so much."""
+    if isinstance(kind, str):
+        return skin and WET.get(kind, skin)
+    return kind

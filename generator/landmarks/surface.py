@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,10 @@ STEP_MM = 1e-3
 
 TOLERANCE_MM = 0.1
 """A point nearer than this behind the first hit is on the surface."""
+
+
+TOGETHER = 64
+"""Views whose rays are cast at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,35 +159,43 @@ class Surface:
         known = np.flatnonzero(np.isfinite(points).all(axis=1))
         seen = np.zeros((len(views), len(points)), dtype=bool)
         rotations = rotation_from_angles(views.angles_deg)
-        for row, (view, rotation) in enumerate(zip(views, rotations, strict=True)):
-            pixels = view.camera.project(points[known] @ rotation.T + view.camera.translation_mm)
-            hidden = self.hides(points[known], rotation, view.camera)
-            seen[row, known] = view.camera.holds(pixels) & ~hidden
+        for start in range(0, len(views), TOGETHER):
+            few = slice(start, start + TOGETHER)
+            cameras = [view.camera for view in views[few]]
+            hidden = self.hides(points[known], rotations[few], cameras)
+            for row, (camera, rotation) in enumerate(zip(cameras, rotations[few], strict=True), start):
+                pixels = camera.project(points[known] @ rotation.T + camera.translation_mm)
+                seen[row, known] = camera.holds(pixels) & ~hidden[row - start]
         return seen
 
     def hides(
         self,
         points: np.ndarray,
-        rotation: np.ndarray,
-        camera: Camera,
+        rotations: np.ndarray,
+        cameras: Sequence[Camera],
         *,
-        offset: np.ndarray | None = None,
+        offsets: np.ndarray | None = None,
         nearer_mm: float = TOLERANCE_MM,
     ) -> np.ndarray:
-        """Which points the surface keeps from a camera, bool [P].
+        """Which points the surface keeps from the cameras of N views, bool [N, P].
 
-        points: float [P, 3], finite, frame C at pose zero, mm. rotation: R_C [3, 3], of both.
-        offset: of the surface, frame C at pose zero, mm. nearer_mm: by how much it has to be before them.
+        points: float [P, 3], finite, frame C at pose zero, mm. rotations: R_C [N, 3, 3], of both.
+        offsets: of the surface, float [N, 3], frame C at pose zero, mm. nearer_mm: by how much it has to be
+        before them.
         """
-        posed = points @ rotation.T + camera.translation_mm
-        origins, directions = camera.towards(posed)
-        # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).
-        start = (origins - camera.translation_mm) @ rotation
-        if offset is not None:
-            start = start - offset
-        hits = self.first_hits(start, directions @ rotation)
-        length = np.linalg.norm(directions, axis=1)
-        hidden: np.ndarray = hits.distances < posed[:, 2] - nearer_mm / length
+        starts, rays, far = [], [], []
+        for row, (rotation, camera) in enumerate(zip(rotations, cameras, strict=True)):
+            posed = points @ rotation.T + camera.translation_mm
+            origins, directions = camera.towards(posed)
+            # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).
+            start = (origins - camera.translation_mm) @ rotation
+            starts.append(start if offsets is None else start - offsets[row])
+            rays.append(directions @ rotation)
+            far.append(posed[:, 2] - nearer_mm / np.linalg.norm(directions, axis=1))
+        if not starts:
+            return np.zeros((0, len(points)), dtype=bool)
+        hits = self.first_hits(np.concatenate(starts), np.concatenate(rays))
+        hidden: np.ndarray = hits.distances.reshape(len(starts), -1) < np.stack(far)
         return hidden
 
     def _weights(self, triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:

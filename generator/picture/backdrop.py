@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import cv2
 import numpy as np
 
 from generator.geometry.camera import Camera
-from generator.picture.develop import to_linear, to_srgb
-
-STEPS = 1 << 16
-"""Of linear light: the darkest byte of sRGB is twenty of them."""
+from generator.picture.develop import to_linear
 
 COARSEST, OCTAVES = 2, 5
 """Cells across of the coarsest noise, and how often they are halved."""
@@ -80,15 +76,9 @@ def filling(picture: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def before(head: np.ndarray, backdrop: np.ndarray) -> np.ndarray:
-    """A head over a backdrop, uint8 [H, W, 3], sRGB; they are mixed in linear light.
+    """A head over a backdrop, float32 [H, W, 3], linear light, which is where they are mixed.
 
     head: float32 [H, W, 4], RGB multiplied by alpha: where half of a pixel is head, half of it is backdrop.
     """
-    light = head[..., :3] + (1 - head[..., 3:]) * backdrop
-    return _bytes()[(np.clip(light, 0, 1) * np.float32(STEPS - 1) + np.float32(0.5)).astype(np.uint16)]
-
-
-@lru_cache(maxsize=1)
-def _bytes() -> np.ndarray:
-    """The sRGB byte of each of STEPS of linear light, uint8 [STEPS]."""
-    return np.rint(to_srgb(np.arange(STEPS) / (STEPS - 1)) * 255).astype(np.uint8)
+    light: np.ndarray = head[..., :3] + (1 - head[..., 3:]) * backdrop
+    return light

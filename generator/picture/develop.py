@@ -25,14 +25,19 @@ OVERSAMPLED = 8
 """Samples a pixel's side of the kernels of defocus and motion."""
 
 
+STEPS = 1 << 16
+"""Of linear light, when it becomes bytes: the darkest byte of sRGB is twenty of them."""
+
+
 def developed(image: np.ndarray, sensor: Sensor, seed: int) -> np.ndarray:
     """An image as a camera gives it, uint8 [H, W, 3], RGB in sRGB; the very image where nothing is set.
 
-    image: uint8 [H, W, 3], RGB, sRGB, as rendered. seed: of the noise, which is the same for the same seed.
+    image: [H, W, 3], RGB, as rendered: uint8, sRGB, or float32, linear. seed: of the noise, which is the same
+    for the same seed.
     """
     if sensor.is_plain:
-        return image
-    light = _to_linear()[image]
+        return image if image.dtype == np.uint8 else to_bytes(image)
+    light = _to_linear()[image] if image.dtype == np.uint8 else image
     gains = np.exp2(sensor.exposure_ev + np.array([0.5, 0.0, -0.5]) * sensor.warmth)
     light = light * gains.astype(np.float32)
     if sensor.defocus_px > 0:
@@ -45,10 +50,7 @@ def developed(image: np.ndarray, sensor: Sensor, seed: int) -> np.ndarray:
     if sensor.noise > 0:
         grain = np.random.default_rng(seed).standard_normal(light.shape, dtype=np.float32)
         light = light + noise_sd(light, sensor.noise) * grain
-    display = to_srgb(light)
-    if sensor.contrast:
-        display = toned(display, sensor.contrast)
-    picture = np.rint(display * 255).astype(np.uint8)
+    picture = to_bytes(light, sensor.contrast)
     return picture if sensor.jpeg >= NO_JPEG else _through_jpeg(picture, round(sensor.jpeg))
 
 
@@ -70,6 +72,19 @@ def to_srgb(light: np.ndarray) -> np.ndarray:
     """Linear light as sRGB, 0-1 [...]; what is brighter is clipped (IEC 61966-2-1)."""
     clipped = np.clip(light, 0, 1)
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+
+
+def to_bytes(light: np.ndarray, contrast: float = 0.0) -> np.ndarray:
+    """Linear light, float32 [...], as bytes of sRGB, uint8 [...], :func:`toned`."""
+    display = toned(_steps(), contrast) if contrast else _steps()
+    of_step = np.rint(display * 255).astype(np.uint8)
+    return of_step[(np.clip(light, 0, 1) * np.float32(STEPS - 1) + np.float32(0.5)).astype(np.uint16)]
+
+
+@lru_cache(maxsize=1)
+def _steps() -> np.ndarray:
+    """The sRGB value of each of STEPS of linear light, float32 [STEPS]."""
+    return to_srgb(np.arange(STEPS) / (STEPS - 1)).astype(np.float32)
 
 
 @lru_cache(maxsize=1)

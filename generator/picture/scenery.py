@@ -82,7 +82,7 @@ class Scenery:
         return np.broadcast_to(backdrop.to_linear(plain), (camera.height, camera.width, 3))
 
     def composed(self, head: np.ndarray, view: View) -> np.ndarray:
-        """A rendered head before its backdrop, uint8 [H, W, 3], sRGB. head: as for backdrop.before."""
+        """A rendered head before its backdrop, float32 [H, W, 3], linear. head: as for backdrop.before."""
         return backdrop.before(head.astype(np.float32), self.behind(view))
 
     def _light(self, look: Look) -> EnvironmentLight | None:

@@ -116,8 +116,10 @@ class Face:
 
         Raises CannotWear without one.
         """
-        if _latest and _latest[0].fit.mesh is fit.mesh and _latest[0].fit.points is fit.points:
-            return _latest[0]
+        return fit.once("face", lambda: cls._found(fit))
+
+    @classmethod
+    def _found(cls, fit: Fit) -> Face:
         known = np.isfinite(fit.points).all(axis=1)
         if known.sum() < SMALLEST_FIT:
             raise CannotWear(f"{int(known.sum())} landmarks have a place on the mesh, too few for a face")
@@ -125,8 +127,7 @@ class Face:
         known &= np.isfinite(mean).all(axis=1)
         found = fit_similarity(mean[known], fit.points[known])
         level = rotation_from_angles(np.array([0.0, FACE_MESH.level_pitch_deg, 0.0]))
-        _latest[:] = [cls(fit, found.rotation @ graphics_rotation(level), found.scale)]
-        return _latest[0]
+        return cls(fit, found.rotation @ graphics_rotation(level), found.scale)
 
     def at(self, *places: int) -> np.ndarray:
         """Landmarks in F, float64 [N, 3]. Raises CannotWear if one has no place."""
@@ -165,7 +166,3 @@ class Face:
     def back(self, mesh: HeadMesh) -> HeadMesh:
         """A mesh in F as one in the head's frame U."""
         return replace(mesh, vertices=mesh.vertices @ self.rotation.T)
-
-
-_latest: list[Face] = []
-"""The face that was asked for last: a head mostly wears several things."""

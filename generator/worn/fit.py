@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from generator.errors import HeadError
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS
 from generator.heads.mesh import HeadMesh
 from generator.landmarks.surface import Surface
+
+T = TypeVar("T")
 
 
 class CannotWear(HeadError):
@@ -26,6 +28,7 @@ class Fit:
     mesh: the head. points: float64 [P, 3], its landmarks (Face Mesh) on the mesh; NaN where there is none.
     others: what else it wears of the kinds that the maker minds, kind -> style. things: folder of a user's
     own things; scratch: an existing folder for textures that are made, which stays as long as what is worn.
+    known: what was found of this mesh and these landmarks, whatever else is worn; see :meth:`once`.
     """
 
     mesh: HeadMesh
@@ -33,6 +36,20 @@ class Fit:
     others: Mapping[str, str] = field(default_factory=dict)
     things: str = ""
     scratch: str = ""
+    known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def beside(self, others: Mapping[str, str]) -> Fit:
+        """The very same head, of which all is known that was found already, wearing other things."""
+        made = replace(self, others=others)
+        object.__setattr__(made, "known", self.known)
+        return made
+
+    def once(self, key: Hashable, find: Callable[[], T]) -> T:
+        """What depends on mesh, landmarks and key alone: found once, for all that the head wears."""
+        if key not in self.known:
+            self.known[key] = find()
+        found: T = self.known[key]
+        return found
 
     def at(self, *places: int) -> np.ndarray:
         """Landmarks by their number, float64 [len(places), 3]. Raises CannotWear if one has no place."""
@@ -42,10 +59,10 @@ class Fit:
             raise CannotWear(f"landmark {missing[0]} has no place on the mesh")
         return found
 
-    @cached_property
+    @property
     def surface(self) -> Surface:
         """The mesh for rays (in frame C)."""
-        return Surface(self.mesh)
+        return self.once("surface", lambda: Surface(self.mesh))
 
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Where rays first meet the head, float64 [N, 3]; NaN where they miss. float [N, 3] twice."""

@@ -13,7 +13,7 @@ from generator.plan.wear import NOTHING
 from generator.worn.colours import ACETATE, METAL, Colour, drawn, luminance, mottled
 from generator.worn.face import Face
 from generator.worn.fit import CannotWear, Fit, Kind
-from generator.worn.shapes import Part, assemble
+from generator.worn.shapes import Part, Shape, assemble
 from generator.worn.spectacle_frames import FRAMES, Frame
 from generator.worn.spectacle_parts import Front, bridge, lens, pads, rim, temple
 
@@ -63,7 +63,7 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     """See :data:`generator.worn.fit.Make`."""
     face, frame = Face.of(fit), FRAMES[style]
     over = OVER_MASK_MM if fit.others.get("mask", NOTHING) != NOTHING else 0.0
-    front, outline = seat(face, frame, float(rng.uniform(0.97, 1.05)), over)
+    size = float(rng.uniform(0.97, 1.05))
     metal, plastic = drawn(METAL, rng), drawn(ACETATE, rng)
     wire = Material("frame metal", metal, label=GLASSES, gloss=0.75)
     acetate = Material("frame", plastic, label=GLASSES, gloss=0.5)
@@ -72,27 +72,40 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     pane = Material("lenses", glass, label=GLASSES, gloss=0.9, opacity=opacity)
     body, colour = (wire, metal) if frame.metal else (acetate, plastic)
     arm, arm_colour = (acetate, plastic) if frame.brow else (body, colour)
-    parts: list[Part] = []
-    for side in (-1, 1):
-        # The outline is that of image right; its mirror image turns the other way.
-        own = outline if side > 0 else (outline * [-1, 1])[::-1]
-        parts.append(Part(lens(front, own), glass, pane))
-        if frame.rim_mm[0]:
-            parts.append(Part(rim(front, own, frame), colour, body))
-        else:
-            edge = Material("lens edge", (0.55, 0.6, 0.62), label=GLASSES, gloss=0.6, opacity=0.45)
-            parts.append(Part(rim(front, own, frame), edge.base_color, edge))
-        if frame.brow:
-            parts.append(Part(rim(front, own, frame, upper=True), plastic, acetate))
-        pad, *wires = pads(face, front, outline, side, frame)
-        parts.append(Part(pad, PAD, Material("pads", PAD, label=GLASSES, gloss=0.4)))
-        parts += [Part(shape, colour, body) for shape in wires]
-        parts.append(Part(temple(face, front, outline, side, frame), arm_colour, arm))
-    parts += [Part(shape, colour, body) for shape in bridge(face, front, outline, frame)]
+    edge = Material("lens edge", (0.55, 0.6, 0.62), label=GLASSES, gloss=0.6, opacity=0.45)
+    looks = {
+        "lens": (glass, pane),
+        "rim": (colour, body),
+        "edge": (edge.base_color, edge),
+        "brow": (plastic, acetate),
+        "pad": (PAD, Material("pads", PAD, label=GLASSES, gloss=0.4)),
+        "wire": (colour, body),
+        "temple": (arm_colour, arm),
+    }
+    shapes = fit.once(("glasses", style, size, over), lambda: _shapes(face, frame, size, over))
+    parts = [Part(shape, *looks[what]) for what, shape in shapes]
     if not frame.metal and rng.random() < 0.3 and luminance(plastic) < 0.5:
         patches = int(rng.integers(1 << 31))
         parts = [_tortoise(part, patches) if part.material is acetate else part for part in parts]
     return face.back(assemble(parts))
+
+
+def _shapes(face: Face, frame: Frame, size: float, over: float) -> list[tuple[str, Shape]]:
+    """What glasses are made of, whatever colours they have."""
+    front, outline = seat(face, frame, size, over)
+    made: list[tuple[str, Shape]] = []
+    for side in (-1, 1):
+        # The outline is that of image right; its mirror image turns the other way.
+        own = outline if side > 0 else (outline * [-1, 1])[::-1]
+        made.append(("lens", lens(front, own)))
+        made.append(("rim" if frame.rim_mm[0] else "edge", rim(front, own, frame)))
+        if frame.brow:
+            made.append(("brow", rim(front, own, frame, upper=True)))
+        pad, *wires = pads(face, front, outline, side, frame)
+        made += [("pad", pad), *(("wire", shape) for shape in wires)]
+        made.append(("temple", temple(face, front, outline, side, frame)))
+    made += [("wire", shape) for shape in bridge(face, front, outline, frame)]
+    return made
 
 
 def _tortoise(part: Part, seed: int) -> Part:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
         # What is gathered, is gathered below the rim.
         cut = replace(cut, layer=min(cut.layer, 12.0), knot=min(cut.knot, LOW_KNOT_DEG))
     level = Level(float(fit.at(105, 334)[:, 1].mean()), float(fit.at(152)[0, 1]))
-    locks = grow(skull, cut, level, rng)
+    locks = _grown(fit, (style, rim is None), skull, cut, level, rng)
     if rim is not None:
         seen = ~rim.hides(locks.paths)
         locks = Locks(rim.flattened(locks.paths[seen], locks.layer[seen]), locks.layer[seen])
@@ -69,6 +70,19 @@ def make(fit: Fit, style: str, rng: np.random.Generator) -> HeadMesh:
     return worn_mesh(
         (Material("worn hair", tuple(color.tolist()), label=HAIR, gloss=cut.gloss), join(pieces))
     )
+
+
+def _grown(
+    fit: Fit, key: tuple[str, bool], skull: Skull, cut: Cut, level: Level, rng: np.random.Generator
+) -> Locks:
+    """Locks of a cut, which grow alike under any hat; the dice are left as growing leaves them."""
+    before = str(rng.bit_generator.state["state"])
+
+    def grown() -> tuple[Locks, Any]:
+        return grow(skull, cut, level, rng), rng.bit_generator.state
+
+    locks, rng.bit_generator.state = fit.once(("locks", *key, before), grown)
+    return locks
 
 
 def _receded(front: float, temples: float) -> np.ndarray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,6 +28,28 @@ class Shape:
     vertices: np.ndarray
     triangles: np.ndarray
 
+    @cached_property
+    def creased(self) -> tuple[Shape, np.ndarray]:
+        """The shape with its sharp edges split, and of which old vertex each new one is, int [V]."""
+        corners = self.vertices[self.triangles]
+        normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        count = len(self.triangles)
+        number = np.arange(3 * count).reshape(count, 3)
+        ends = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+        of_corner = np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2)
+        swap = ends[:, 0] > ends[:, 1]
+        ends[swap], of_corner[swap] = ends[swap, ::-1], of_corner[swap, ::-1]
+        order = np.argsort(ends[:, 0].astype(np.int64) * len(self.vertices) + ends[:, 1], kind="stable")
+        ends, of_corner, face = ends[order], of_corner[order], (np.arange(3 * count) // 3)[order]
+        same = (ends[1:] == ends[:-1]).all(axis=1)
+        smooth = same & ((normals[face[1:]] * normals[face[:-1]]).sum(1) > np.cos(np.radians(CREASE_DEG)))
+        one, other = of_corner[:-1][smooth].ravel(), of_corner[1:][smooth].ravel()
+        links = coo_matrix((np.ones(len(one)), (one, other)), shape=(3 * count, 3 * count))
+        _, label = connected_components(links, directed=False)
+        _, first, triangles = np.unique(label, return_index=True, return_inverse=True)
+        origin = self.triangles.ravel()[first]
+        return Shape(self.vertices[origin], triangles.reshape(count, 3)), origin
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -43,7 +66,7 @@ def assemble(parts: Sequence[Part]) -> HeadMesh:
     materials: list[Material] = []
     start = 0
     for part in parts:
-        shape, origin = _creased(part.shape)
+        shape, origin = part.shape.creased
         of_part = np.broadcast_to(np.asarray(part.colors, dtype=np.float32), part.shape.vertices.shape)
         if part.material not in materials:
             materials.append(part.material)
@@ -247,25 +270,3 @@ def _steady_up(path: np.ndarray) -> np.ndarray:
         up = unit(up - (up @ along) * along)
         found.append(up)
     return np.array(found)
-
-
-def _creased(shape: Shape) -> tuple[Shape, np.ndarray]:
-    """A shape whose sharp edges are split, and of which old vertex each new one is, int [V]."""
-    corners = shape.vertices[shape.triangles]
-    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    count = len(shape.triangles)
-    number = np.arange(3 * count).reshape(count, 3)
-    ends = np.stack([shape.triangles, np.roll(shape.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    of_corner = np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2)
-    swap = ends[:, 0] > ends[:, 1]
-    ends[swap], of_corner[swap] = ends[swap, ::-1], of_corner[swap, ::-1]
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    ends, of_corner, face = ends[order], of_corner[order], (np.arange(3 * count) // 3)[order]
-    same = (ends[1:] == ends[:-1]).all(axis=1)
-    smooth = same & ((normals[face[1:]] * normals[face[:-1]]).sum(1) > np.cos(np.radians(CREASE_DEG)))
-    one, other = of_corner[:-1][smooth].ravel(), of_corner[1:][smooth].ravel()
-    links = coo_matrix((np.ones(len(one)), (one, other)), shape=(3 * count, 3 * count))
-    _, label = connected_components(links, directed=False)
-    _, first, triangles = np.unique(label, return_index=True, return_inverse=True)
-    origin = shape.triangles.ravel()[first]
-    return Shape(shape.vertices[origin], triangles.reshape(count, 3)), origin

@@ -101,6 +101,10 @@ _GRID = np.meshgrid(TURN, _RISE, indexing="ij")
 
 def find_skull(fit: Fit) -> Skull:
     """The skull of a head. Raises CannotWear if a landmark is missing, or the head has no back or top."""
+    return fit.once("skull", lambda: _found(fit))
+
+
+def _found(fit: Fit) -> Skull:
     width = fit.at(234, 454)
     scale = float(np.linalg.norm(width[1] - width[0])) / UNIT_MM
     if not 0.3 < scale < 3:

@@ -15,7 +15,7 @@ from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angl
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.surroundings import with_triangles
-from generator.landmarks.surface import Surface
+from generator.landmarks.surface import TOGETHER, Surface
 from generator.plan.draws import draw_seed
 from generator.plan.views import View, Views
 from generator.plan.wear import STYLES, Worn
@@ -78,16 +78,20 @@ class Outfits:
         known = np.flatnonzero(np.isfinite(points).all(axis=1))
         if not self.things:
             return hidden
-        for row, (view, rotation) in enumerate(
-            zip(views, rotation_from_angles(views.angles_deg), strict=True)
-        ):
-            for thing, offset in self.things[row]:
+        rotations = rotation_from_angles(views.angles_deg)
+        worn: dict[Thing, list[tuple[int, np.ndarray]]] = {}
+        for row, things in enumerate(self.things):
+            for thing, offset in things:
+                worn.setdefault(thing, []).append((row, offset @ CAMERA_FROM_GRAPHICS))
+        for thing, where in worn.items():
+            for start in range(0, len(where), TOGETHER):
+                rows, offsets = zip(*where[start : start + TOGETHER], strict=True)
                 if thing.surface is not None:
-                    hidden[row, known] |= thing.surface.hides(
+                    hidden[np.ix_(rows, known)] |= thing.surface.hides(
                         points[known],
-                        rotation,
-                        view.camera,
-                        offset=offset @ CAMERA_FROM_GRAPHICS,
+                        rotations[list(rows)],
+                        [views[row].camera for row in rows],
+                        offsets=np.stack(offsets),
                         nearer_mm=NEARER_MM,
                     )
         return hidden
@@ -144,7 +148,7 @@ class Wardrobe:
             try:
                 if style not in STYLES.get(kind, (style,)):
                     raise CannotWear(f"there is no {style!r}")
-                mesh = maker.make(replace(self._fit, others=others), style, rng)
+                mesh = maker.make(self._fit.beside(others), style, rng)
                 if not np.isfinite(mesh.vertices).all():
                     raise CannotWear("what was made has no finite shape")
                 self._made[key] = self._packed(kind, mesh)

@@ -25,12 +25,13 @@ pytest.importorskip("onnxruntime")
 from downstream_hpe.networks.export import export_int8, export_onnx  # noqa: E402
 from downstream_hpe.networks.pose_network import PoseNetwork, rotation_of  # noqa: E402
 from downstream_hpe.networks.recipe import PAPER, Recipe  # noqa: E402
+from downstream_hpe.networks.rigid_fit import FACTORS  # noqa: E402
 from downstream_hpe.networks.samples import Samples  # noqa: E402
 from downstream_hpe.networks.training import train  # noqa: E402
 from downstream_hpe.networks.weights import Weights  # noqa: E402
 from downstream_hpe.prediction.predictor import Pose, Predictor  # noqa: E402
 
-SMALL = Recipe(layers=(1404, 32, 9), head_layers=(3, 16, 1), epochs=2, batch=64)
+SMALL = Recipe(layers=(FACTORS + 5, 32, 9), head_layers=(3, 16, 1), epochs=2, batch=64)
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
 
 
@@ -107,9 +108,12 @@ def test_an_epoch_goes_over_few_rows_more_than_once(rows, model, tmp_path, monke
 @pytest.mark.parametrize("recipe", [PAPER, Recipe()], ids=["paper", "continuous"])
 def test_a_few_epochs_learn(rows, model, tmp_path, recipe):
     losses = []
-    short = replace(recipe, layers=(1404, 128, 64, 9), head_layers=(3, 64, 1), epochs=20, batch=64)
+    short = replace(
+        recipe, layers=(recipe.layers[0], 128, 64, 9), head_layers=(3, 64, 1), epochs=20, batch=64
+    )
     network = train(rows, model, short, tmp_path, lambda done, total, loss: losses.append(loss))
-    assert losses[-1] < 0.2 * losses[0]
+    # The continuous one starts from the rigid fit, which is not far off already.
+    assert losses[-1] < (0.6 if recipe.continuous else 0.2) * losses[0]
     features = torch.from_numpy(normalise(rows.landmarks).reshape(len(rows), -1))
     error = np.abs(network(features).detach().numpy() - rows.ypr_deg).mean()
     assert error < 4

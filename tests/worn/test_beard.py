@@ -22,7 +22,7 @@ MOST_TRIANGLES = 22_000
 
 def made(kind: str, fit: Fit, style: str, seed: int = 3, **others: str) -> HeadMesh:
     maker = {"beard": beard, "brows": brows}[kind].KIND
-    return maker.make(replace(fit, others=others), style, np.random.default_rng(seed))
+    return maker.make(fit.beside(others), style, np.random.default_rng(seed))
 
 
 def heights(fit: Fit, points: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ FACE = (1, 4, 33, 133, 159, 263, 362, 386, 50, 280, 0, 13, 17, 61, 291, 152)
 
 
 def made(fit: Fit, style: str, seed: int = 3, **others: str) -> HeadMesh:
-    return KIND.make(replace(fit, others=others), style, np.random.default_rng(seed))
+    return KIND.make(fit.beside(others), style, np.random.default_rng(seed))
 
 
 def standing_off(fit: Fit, hair: HeadMesh) -> np.ndarray:

@@ -40,7 +40,7 @@ MOST_TRIANGLES = 6000
 
 def make(fit: Fit, kind: str, style: str, seed: int = 3, **others: str) -> HeadMesh:
     """A thing on a head."""
-    return WORN.get(kind).make(replace(fit, others=others), style, np.random.default_rng(seed))
+    return WORN.get(kind).make(fit.beside(others), style, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize(("kind", "style"), THINGS)

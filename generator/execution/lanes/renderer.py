@@ -47,8 +47,8 @@ def worker_command(blender: str | None, threads: int) -> list[str]:
                 f"{blender}: not an executable Blender; give the path of one, or leave --blender out"
             )
         script = str(_PACKAGE / "blender" / "worker.py")
-        flags = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", script]
-        return [blender, *flags, "--", str(threads)]
+        flags = ["--background", "--factory-startup", "--threads", str(threads)]
+        return [blender, *flags, "--python-exit-code", "1", "--python", script, "--", str(threads)]
     if find_spec("bpy") is None:
         raise UsageError(
             "bpy is not installed: pip install 'headturn[build]' with Python 3.11, "
