@@ -95,15 +95,17 @@ def test_estimates_must_be_finite(confidence):
 
 
 def test_a_few_rows_decide_nothing(confidence):
-    """Ten estimates beyond the range, all wrong, do not make those a little beyond it hopeless."""
+    """Ten faces a little beyond the range, all estimated wrongly, do not make it hopeless there."""
     landmarks, ypr = faces(10)
     level = (confidence.mean, confidence.basis, confidence.scale)
-    estimate = estimated(ypr, 11)
-    estimate[:10] = [0, 0, 35]
-    features = normalise(landmarks).reshape(COUNT, -1)
-    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    true, estimate = rotation_from_angles(ypr), estimated(ypr, 11)
+    there = rotation_from_angles(np.array([0.0, 0, 35]))
+    landmarks[:10] = landmarks[:10] @ true[:10] @ there.T
+    estimate[:10], true[:10] = [0, 0, 35], rotation_from_angles(np.array([6.0, 0, 35]))
+    features, found = normalise(landmarks).reshape(COUNT, -1), rotation_from_angles(estimate)
     again = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
-    assert again.weights[-1] < 1000
+    assert 400 <= again.weights[-1] < 1200
+    assert again.of(features, estimate, found)[:10].mean() > 0.15
 
 
 def test_what_plausibility_takes_is_not_taken_twice(confidence):

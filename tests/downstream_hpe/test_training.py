@@ -144,10 +144,13 @@ def confidence(rows):
     return calibrate(faces, RANGE, features, estimates, rotation, some.rotation, np.ones(300))
 
 
-@pytest.mark.parametrize("normalisation", ["rms", "eyes"])
-def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normalisation):
+@pytest.mark.parametrize(("normalisation", "share"), [("rms", 1), ("eyes", 1), ("rms", 0.01)])
+def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normalisation, share):
     torch.manual_seed(0)
     network = PoseNetwork().eval()
+    # What an untrained network answers is small: within the range, or beyond a share of it. All counts.
+    weights = np.array([*confidence.weights[:6], 3e3, 4e3, 5e3, 4e4, 5e4, 6e4])
+    confidence = replace(confidence, range_deg=share * RANGE, weights=weights)
     export_onnx(Weights(network, normalisation, RANGE, confidence), tmp_path / "model.onnx")
     predictor = Predictor.load(tmp_path)
     raw = (200 + 73 * rows.landmarks[::50]).astype(np.float32)
@@ -159,6 +162,8 @@ def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normal
         expected = network(torch.from_numpy(features)).numpy()
     np.testing.assert_allclose(pose.ypr_deg, expected, atol=5e-5)
     np.testing.assert_allclose(pose.rotation, rotation_from_angles(pose.ypr_deg), atol=1e-5)
+    beyond = np.abs(pose.ypr_deg) > share * RANGE[:, 1]
+    assert (beyond == (share < 1)).all()
     chance = confidence.of(features, pose.ypr_deg, pose.rotation)
     np.testing.assert_allclose(pose.confidence, chance, atol=1e-5)
     np.testing.assert_array_equal(predictor.range_deg, RANGE)
