@@ -46,14 +46,14 @@ def test_a_model_is_less_sure_where_there_may_be_no_face(tmp_path):
     (tmp_path / "m.onnx").write_bytes(tiny_model().SerializeToString())
     predictor = Predictor.load(tmp_path / "m.onnx")
     garbage = np.random.default_rng(0).normal(size=(5, 468, 3))
-    assert predictor.from_landmarks(garbage).confidence.max() < 1e-6
+    assert predictor.from_landmarks(garbage).confidence.max() < 1e-3
     assert predictor.from_landmarks(shaped()).confidence[0] > 0.3
     # What the graph says, times what is left of it.
     doubtful = doubtful_face()
     graph = predictor.graph(doubtful.astype(np.float32))["confidence"]
     share = FaceShapes.load().share(doubtful)
     np.testing.assert_allclose(predictor.from_landmarks(doubtful).confidence, graph * share, rtol=1e-5)
-    np.testing.assert_allclose(share**2, FaceShapes.load().plausibility(doubtful))
+    np.testing.assert_allclose(share**4, FaceShapes.load().plausibility(doubtful))
 
 
 def test_no_pose_of_the_range_counts_as_on_its_side():
