@@ -15,10 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from downstream_hpe.geometry.face_mesh import FEATURES
 from downstream_hpe.geometry.mean_head import mean_head
+from downstream_hpe.geometry.normalise import normalise
 from downstream_hpe.networks.export import export_int8, export_onnx
 from downstream_hpe.networks.pose_network import PoseNetwork
 from downstream_hpe.networks.recipe import RECIPES
+from downstream_hpe.networks.rigid_fit import FACTORS, RigidFit
 from downstream_hpe.networks.weights import Weights
 from downstream_hpe.prediction.predictor import MODELS, Predictor
 
@@ -66,13 +69,17 @@ def time_detector() -> None:
 def time_recipes() -> None:
     """The graphs a fit writes, with random weights: the same graph, the same time."""
     ranges = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
+    face, curves = normalise(mean_head()).reshape(-1), np.ones((FACTORS, 4))
     with tempfile.TemporaryDirectory() as folder:
         for name, recipe in RECIPES.items():
             whole, small = Path(folder) / f"{name}.onnx", Path(folder) / f"{name}-int8.onnx"
-            weights = Weights(PoseNetwork(recipe.layers, recipe.head_layers).eval(), "rms", ranges)
+            basis = np.zeros((FEATURES, recipe.components))
+            rigid = RigidFit(face, basis, curves) if recipe.continuous else None
+            network = PoseNetwork(recipe.layers, recipe.head_layers, rigid=rigid)
+            weights = Weights(network.eval(), "rms", ranges)
             export_onnx(weights, whole)
             time_model(f"{name}: {'-'.join(map(str, recipe.layers))}", whole)
-            if not recipe.continuous:
+            if rigid is None:
                 export_int8(weights, small)
                 time_model(f"{name}, 8 bits", small)
 

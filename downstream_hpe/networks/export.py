@@ -15,10 +15,12 @@ from scipy.linalg import block_diag
 from torch import nn
 
 from downstream_hpe.geometry.face_mesh import FEATURES, LEFT_EYE, NOSE_TIP, POINTS, RIGHT_EYE
+from downstream_hpe.geometry.metrics import SURE_DEG
 from downstream_hpe.geometry.normalise import Normalisation
 from downstream_hpe.model_file import packed
-from downstream_hpe.networks.confidence import BEYOND_DEG, TURNS, Confidence
-from downstream_hpe.networks.pose_network import PoseNetwork
+from downstream_hpe.networks.confidence import BEYOND_DEG, STRANGE, TURNS, Confidence
+from downstream_hpe.networks.pose_network import REACH, PoseNetwork
+from downstream_hpe.networks.rigid_fit import ENTRIES, LEAST, SHIFT, SQUARINGS, RigidFit
 from downstream_hpe.networks.weights import Weights
 from downstream_hpe.prediction.onnx_file import FORMAT, IR_VERSION, OPSET
 
@@ -71,8 +73,7 @@ def export_onnx(weights: Weights, path: Path) -> None:
     graph = _Graph()
     scaled = _normalised(graph, normalisation)
     features = graph.add("Reshape", scaled, graph.constant(np.array([-1, FEATURES])))
-    factors = graph.multilayer(network.encoder, features)
-    _heads(graph, network, factors)
+    _heads(graph, network, _factors(graph, network, scaled, features))
     _rotation(graph)
     outputs: list[tuple[str, list[str | int]]] = [("ypr_deg", ["N", 3]), ("rotation", ["N", 3, 3])]
     if weights.confidence is not None:
@@ -143,6 +144,63 @@ def _normalised(graph: _Graph, normalisation: Normalisation) -> str:
     return graph.add("Div", centred, scale)
 
 
+def _factors(graph: _Graph, network: PoseNetwork, scaled: str, features: str) -> str:
+    """:meth:`downstream_hpe.networks.pose_network.PoseNetwork.factors`."""
+    if network.rigid is None:
+        return graph.multilayer(network.encoder, features)
+    start, shape = _rigid_fit(graph, network.rigid, scaled, features)
+    moved = graph.multilayer(network.encoder, graph.add("Concat", start, shape, axis=1))
+    return graph.add("Add", start, graph.add("Mul", graph.add("Tanh", moved), graph.number(REACH)))
+
+
+def _rigid_fit(graph: _Graph, rigid: RigidFit, scaled: str, features: str) -> tuple[str, str]:
+    """:class:`downstream_hpe.networks.rigid_fit.RigidFit`: factor vectors [N, 9], coordinates [N, K]."""
+    flat = graph.add("MatMul", features, graph.array(rigid.matrix()))
+    size = graph.add("ReduceL2", flat, axes=[1], keepdims=1)
+    unit = graph.add("Div", flat, graph.add("Add", size, graph.number(LEAST)))
+    shifted = graph.add("Add", unit, graph.array(SHIFT * np.eye(4).reshape(1, 16)))
+    powers = graph.add("Reshape", shifted, graph.constant(np.array([-1, 4, 4])))
+    for _ in range(SQUARINGS):
+        powers = graph.add("MatMul", powers, powers)
+    flat = graph.add("Reshape", powers, graph.constant(np.array([-1, 16])))
+    trace = graph.add("MatMul", flat, graph.array(np.eye(4).reshape(16, 1)))
+    entries = graph.add("MatMul", graph.add("Div", flat, trace), graph.array(ENTRIES.T))
+    rotation = graph.add("Reshape", entries, graph.constant(np.array([-1, 3, 3])))
+    level = graph.add(
+        "Reshape", graph.add("MatMul", scaled, rotation), graph.constant(np.array([-1, FEATURES]))
+    )
+    mean, basis = (value.double().numpy() for value in (rigid.mean, rigid.basis))
+    shape = graph.linear(level, basis.T, -mean @ basis)
+    alpha, beta, gamma, phi = rigid.curves.double().numpy().T
+    turns = np.repeat(np.eye(3), len(beta) // 3, axis=0) * beta[:, None]
+    cosines = graph.add("Cos", graph.linear(_angles(graph, entries), turns, gamma))
+    start = graph.add("Add", graph.add("Mul", cosines, graph.array(alpha)), graph.array(phi))
+    return start, shape
+
+
+def _angles(graph: _Graph, entries: str) -> str:
+    """Yaw, pitch and roll in radians of the entries of R_C, [N, 9] -> [N, 3].
+
+    atan2(y, x) = 2 atan(y / (r + x)), of yaw with x = cos yaw and r = 1; of the others r = cos yaw.
+    """
+    cosine = graph.add(
+        "ReduceL2",
+        graph.add("Gather", entries, graph.constant(np.array([5, 8])), axis=1),
+        axes=[1],
+        keepdims=1,
+    )
+    above, below = np.zeros((9, 3)), np.zeros((9, 3))
+    above[[2, 5, 1], [0, 1, 2]] = 1, 1, -1
+    below[[8, 0], [1, 2]] = 1
+    right = graph.add(
+        "Add", graph.add("MatMul", entries, graph.array(below)), graph.array(np.array([[1.0, LEAST, LEAST]]))
+    )
+    ratio = graph.add(
+        "Div", graph.add("MatMul", entries, graph.array(above)), graph.add("Add", right, cosine)
+    )
+    return graph.add("Mul", graph.add("Atan", ratio), graph.number(2.0))
+
+
 def _heads(graph: _Graph, network: PoseNetwork, factors: str) -> None:
     """The three heads side by side, each layer one matrix with three blocks; and the output ypr_deg.
 
@@ -208,16 +266,17 @@ def _confidence(graph: _Graph, confidence: Confidence, scaled: str) -> None:
     sums[1:, 2][turns] = 1 / confidence.scale[:-1][turns]
     squares = graph.add("MatMul", graph.add("Concat", whole, parts, axis=1), graph.array(sums))
     sizes = graph.add("Sqrt", graph.add("Relu", squares))
+    strange = graph.add("Relu", graph.add("Sub", sizes, graph.number(STRANGE)))
     middle, half = confidence.range_deg.mean(axis=1), np.ptp(confidence.range_deg, axis=1) / 2
     place = graph.add("Abs", graph.add("Sub", "ypr_deg", graph.array(middle)))
     beyond = graph.add("Relu", graph.add("Sub", place, graph.array(half)))
     inside = graph.add("Sub", place, beyond)
-    angles = graph.add("Concat", inside, beyond, axis=1)
-    # Their units are degrees here; the weights take them as Confidence.quantities has them.
-    squared = graph.add("Mul", angles, angles)
+    # The angles' units are degrees here; the weights take them as Confidence.quantities has them.
+    parts = graph.add("Concat", strange, inside, beyond, axis=1)
+    squared = graph.add("Mul", parts, parts)
     quantities = graph.add("Concat", sizes, squared, axis=1)
-    units = np.concatenate([np.ones(3), half**2, np.full(3, BEYOND_DEG**2)])
-    bias = np.array([confidence.bias])
-    logit = graph.linear(quantities, -(confidence.weights / units)[None], bias)
-    chance = graph.add("Sigmoid", logit)
+    units = np.concatenate([np.ones(6), half**2, np.full(3, BEYOND_DEG**2)])
+    expected = graph.linear(quantities, (confidence.weights / units)[None], np.array([confidence.bias]))
+    beyond_it = graph.add("Exp", graph.add("Div", graph.number(-(SURE_DEG**2)), expected))
+    chance = graph.add("Sub", graph.number(1.0), beyond_it)
     graph.add("Reshape", chance, graph.constant(np.array([-1])), output="confidence")

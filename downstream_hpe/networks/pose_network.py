@@ -10,9 +10,12 @@ import torch
 from torch import nn
 
 from downstream_hpe.geometry.face_mesh import FEATURES
+from downstream_hpe.networks.rigid_fit import RigidFit
 
 PAPER_LAYERS = (FEATURES, 1024, 512, 256, 128, 64, 9)
 HEAD_LAYERS = (3, 128, 256, 128, 64, 1)
+REACH = 0.2
+"""How far the encoder moves a factor vector that starts from a rigid fit: about 15 degrees."""
 
 
 def multilayer(widths: Sequence[int], last: type[nn.Module]) -> nn.Sequential:
@@ -30,6 +33,10 @@ class PoseNetwork(nn.Module):
 
     layers: widths of the encoder, to 9. head_layers: of a head, from 3 to 1. scale_deg: what
     one unit of a head's output is, in degrees, a float an angle.
+
+    rigid: with it the encoder does not see the landmarks but what their rigid fit makes of them, factor
+    vectors and K coordinates of shape, and what it gives is added to those factor vectors, by REACH at most.
+    It is then (9 + K)-...-9.
     """
 
     scale_deg: torch.Tensor
@@ -39,6 +46,7 @@ class PoseNetwork(nn.Module):
         layers: Sequence[int] = PAPER_LAYERS,
         head_layers: Sequence[int] = HEAD_LAYERS,
         scale_deg: Sequence[float] = (50, 40, 30),
+        rigid: RigidFit | None = None,
     ) -> None:
         super().__init__()
         if min(len(layers), len(head_layers)) < 2 or (layers[-1], head_layers[0], head_layers[-1]) != (
@@ -47,6 +55,9 @@ class PoseNetwork(nn.Module):
             1,
         ):
             raise ValueError(f"expected layers to 9 and heads from 3 to 1, got {layers} and {head_layers}")
+        if rigid is not None and layers[0] != rigid.sees:
+            raise ValueError(f"an encoder of {layers[0]} numbers after a rigid fit that gives {rigid.sees}")
+        self.rigid = rigid
         self.encoder = multilayer(layers, nn.Tanh)
         self.heads = nn.ModuleList(multilayer(head_layers, nn.ReLU) for _ in range(3))
         self.register_buffer("scale_deg", torch.tensor(scale_deg, dtype=torch.float32))
@@ -57,9 +68,16 @@ class PoseNetwork(nn.Module):
         found = torch.cat([head(part) for head, part in zip(self.heads, parts, strict=True)], dim=-1)
         return found * self.scale_deg
 
+    def factors(self, features: torch.Tensor) -> torch.Tensor:
+        """Normalised landmarks [N, 1404] -> factor vectors [N, 9]."""
+        if self.rigid is None:
+            return self.encoder(features)
+        start, shape = self.rigid(features)
+        return start + REACH * torch.tanh(self.encoder(torch.cat([start, shape], dim=1)))
+
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Normalised landmarks [N, 1404] -> (yaw, pitch, roll) in degrees [N, 3]."""
-        return self.angles(self.encoder(features))
+        return self.angles(self.factors(features))
 
 
 def rotation_of(ypr_deg: torch.Tensor) -> torch.Tensor:

@@ -6,31 +6,30 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from downstream_hpe.errors import UsageError
-from downstream_hpe.geometry.face_mesh import FEATURES
 from downstream_hpe.networks.augment import NONE, Disturbances
 from downstream_hpe.networks.pose_network import HEAD_LAYERS, PAPER_LAYERS
+from downstream_hpe.networks.rigid_fit import FACTORS
 
 
 @dataclass(frozen=True)
 class Recipe:
     """rotation_weight: of the distance |R - R'|. average: share of the running mean of the weights
-    that a step leaves; 0: the last weights. components: principal components of the features that the
-    encoder is trained on, 0: the features themselves; floor: added to the standard deviation of each.
+    that a step leaves; 0: the last weights. components: coordinates of shape that the encoder sees beside
+    the rigid fit's factor vectors; 0: it sees the landmarks.
     least_steps: of an epoch, which goes over few rows more than once for them."""
 
-    layers: tuple[int, ...] = (FEATURES, 384, 128, 64, 9)
+    layers: tuple[int, ...] = (FACTORS + 5, 64, 32, 9)
     head_layers: tuple[int, ...] = (3, 64, 64, 1)
-    epochs: int = 30
+    epochs: int = 20
     batch: int = 256
     learning_rate: float = 2e-3
-    weight_decay: float = 1e-2
+    weight_decay: float = 1e-1
     average: float = 0.998
     seed: int = 0
     continuous: bool = True
     disturbances: Disturbances = field(default_factory=Disturbances)
     rotation_weight: float = 1.0
-    components: int = 400
-    floor: float = 0.01
+    components: int = 5
     least_steps: int = 20
 
 

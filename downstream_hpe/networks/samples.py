@@ -25,45 +25,33 @@ CURVE_MARGIN_DEG = 10.0
 class Samples:
     """faces float32 [N, 468, 3], normalised, level where shapes are; rotation float64 [N, 3, 3];
     shapes float32 [H, 468, 3] of :func:`shapes_of`, and no factors; or factors float32 [N, 9] of the
-    grid's poses. mean float64 [1404], basis float64 [1404, K]: what the encoder sees is
-    (x - mean) basis, or x itself.
-
-    The directions in which faces differ least are a hundredth of those in which poses do, and tell most
-    about where a face's zero is. A gradient would find them last.
-    """
+    grid's poses."""
 
     faces: np.ndarray
     rotation: np.ndarray
     shapes: np.ndarray | None
     factors: np.ndarray | None
-    mean: np.ndarray
-    basis: np.ndarray | None
     model: TensorModel
 
     @staticmethod
     def of(rows: Rows, model: TensorModel, recipe: Recipe) -> Samples:
         faces = normalise(rows.landmarks, model.normalisation).astype(np.float32)
-        mean, basis = _basis(faces, recipe)
         if recipe.continuous:
             level = levelled(faces, rows.rotation)
             shapes = shapes_of(level, rows.heads, rows.ypr_deg)
-            return Samples(level, rows.rotation, shapes, None, mean, basis, model)
+            return Samples(level, rows.rotation, shapes, None, model)
         columns = []
         for k, (axis, factor) in enumerate(zip(model.axes_deg, model.poses, strict=True)):
             place = np.abs(rows.ypr_deg[:, k, None] - axis).argmin(axis=1)
             if np.abs(rows.ypr_deg[:, k] - axis[place]).max() > 1e-6:
                 raise ModelError("the paper's recipe needs poses on the grid; use the continuous one")
             columns.append(factor[place])
-        return Samples(faces, rows.rotation, None, np.concatenate(columns, axis=1), mean, basis, model)
-
-    def layers(self, recipe: Recipe) -> tuple[int, ...]:
-        """Widths of the encoder for what it sees."""
-        return recipe.layers if self.basis is None else (self.basis.shape[1], *recipe.layers[1:])
+        return Samples(faces, rows.rotation, None, np.concatenate(columns, axis=1), model)
 
     def batch(
         self, chosen: np.ndarray, recipe: Recipe, rng: np.random.Generator
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """What the encoder sees [B, K], factor vectors [B, 9] and R_C [B, 3, 3]."""
+        """Normalised landmarks [B, 1404], factor vectors [B, 9] and R_C [B, 3, 3]."""
         faces, rotation = self.faces[chosen], self.rotation[chosen]
         if self.shapes is None:
             assert self.factors is not None
@@ -73,23 +61,9 @@ class Samples:
             faces = normalise(faces, self.model.normalisation)
             factors = np.concatenate(self.model.manifolds.values(angles_from_rotation(rotation)), axis=1)
         features = faces.reshape(len(chosen), -1)
-        if self.basis is not None:
-            features = (features - self.mean) @ self.basis
         arrays = (features, factors, rotation)
         seen, targets, turned = (torch.from_numpy(np.asarray(a, dtype=np.float32)) for a in arrays)
         return seen, targets, turned
-
-
-def _basis(faces: np.ndarray, recipe: Recipe) -> tuple[np.ndarray, np.ndarray | None]:
-    """Mean and basis of :class:`Samples`: principal directions, each divided by its deviation."""
-    features = faces.reshape(len(faces), -1).astype(np.float64)
-    if not recipe.components:
-        return np.zeros(features.shape[1]), None
-    mean = features.mean(axis=0)
-    centred = features - mean
-    variance, directions = np.linalg.eigh(centred.T @ centred / len(centred))
-    kept = np.argsort(variance)[::-1][: recipe.components]
-    return mean, directions[:, kept] / (np.sqrt(np.maximum(variance[kept], 0)) + recipe.floor)
 
 
 class Curves:

@@ -21,6 +21,7 @@ from downstream_hpe.manifold.tensor_model import TensorModel
 from downstream_hpe.networks import checkpoint
 from downstream_hpe.networks.pose_network import PoseNetwork, rotation_of
 from downstream_hpe.networks.recipe import Recipe
+from downstream_hpe.networks.rigid_fit import RigidFit
 from downstream_hpe.networks.samples import Curves, Samples
 from downstream_hpe.tables.rows import Rows
 
@@ -45,9 +46,10 @@ def train(
     dataset = Samples.of(rows, model, recipe)
     curves = Curves(model, rows.ypr_deg)
     scale = [float(np.abs(r).max()) for r in model.manifolds.range_deg]
+    rigid = RigidFit.of(dataset.faces, model.manifolds, recipe.components) if recipe.continuous else None
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(recipe.seed)
-        network = PoseNetwork(dataset.layers(recipe), recipe.head_layers, scale)
+        network = PoseNetwork(recipe.layers, recipe.head_layers, scale, rigid)
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay
     )
@@ -71,20 +73,7 @@ def train(
         checkpoint.save(stopped, network, average, optimizer, identity, epoch + 1)
         if progress is not None:
             progress(epoch + 1, recipe.epochs, loss)
-    return _whole(average.module, dataset, recipe, scale)  # type: ignore[arg-type]
-
-
-def _whole(network: PoseNetwork, dataset: Samples, recipe: Recipe, scale: list[float]) -> PoseNetwork:
-    """The network of the features themselves: W B^T (x - m) + b = (W B^T) x + (b - W B^T m)."""
-    if dataset.basis is None:
-        return network.eval()
-    whole = PoseNetwork(recipe.layers, recipe.head_layers, scale)
-    state = network.state_dict()
-    weight = state["encoder.0.weight"].double().numpy() @ dataset.basis.T
-    bias = state["encoder.0.bias"].double().numpy() - weight @ dataset.mean
-    state["encoder.0.weight"], state["encoder.0.bias"] = torch.tensor(weight), torch.tensor(bias)
-    whole.load_state_dict(state)
-    return whole.eval()
+    return average.module.eval()  # type: ignore[return-value]
 
 
 def _epoch(
@@ -104,7 +93,7 @@ def _epoch(
     for first in range(0, len(order), recipe.batch):
         features, factors, rotation = dataset.batch(order[first : first + recipe.batch], recipe, rng)
         points, angles = curves.draw(recipe.batch, rng)
-        encoded = network.encoder(features)
+        encoded = network.factors(features)
         scale = network.scale_deg
         loss = nn.functional.mse_loss(encoded, factors) / curves.variance
         loss = loss + nn.functional.mse_loss(network.angles(points) / scale, angles / scale)

@@ -16,11 +16,12 @@ from downstream_hpe.geometry.normalise import NORMALISATIONS, Normalisation
 from downstream_hpe.model_file import packed, read_safetensors
 from downstream_hpe.networks.confidence import Confidence
 from downstream_hpe.networks.pose_network import PoseNetwork, widths
+from downstream_hpe.networks.rigid_fit import RIGID_PARTS, RigidFit
 
 NETWORK_FILE = "network.safetensors"
 """Its name in a model folder."""
-FORMAT = "downstream-hpe network 2"
-_CONFIDENCE = "confidence."
+FORMAT = "downstream-hpe network 3"
+_CONFIDENCE, _RIGID = "confidence.", "rigid."
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,14 @@ class Weights:
         arrays, facts = read_safetensors(path, FORMAT)
         beside = {name: arrays.pop(name) for name in list(arrays) if name.startswith(_CONFIDENCE)}
         try:
-            network = PoseNetwork(facts["layers"], facts["head_layers"])
-            if facts["layers"][0] != FEATURES:
+            parts = [arrays[_RIGID + name] for name in RIGID_PARTS if _RIGID + name in arrays]
+            rigid = RigidFit(*parts) if parts else None
+            network = PoseNetwork(facts["layers"], facts["head_layers"], rigid=rigid)
+            if rigid is None and facts["layers"][0] != FEATURES:
                 raise ValueError(f"{facts['layers'][0]} features")
             network.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()})
-            parts: dict[str, Any] = {name.removeprefix(_CONFIDENCE): a for name, a in beside.items()}
-            confidence = Confidence(**{**parts, "bias": float(parts["bias"])}) if parts else None
+            known: dict[str, Any] = {name.removeprefix(_CONFIDENCE): a for name, a in beside.items()}
+            confidence = Confidence(**{**known, "bias": float(known["bias"])}) if known else None
             ranges = np.array(facts["range_deg"], dtype=float)
             subjects, zero = tuple(facts["trained_subjects"]), facts.get("pose_zero")
         except (KeyError, TypeError, ValueError, RuntimeError) as error:

@@ -84,13 +84,7 @@ class FaceDetector:
     def _turned(self, rgb: np.ndarray, quarter: int) -> np.ndarray | None:
         """The face of a picture turned by so many quarters, in the pixels of the picture as it is."""
         found = self.mesh(np.ascontiguousarray(np.rot90(rgb, quarter)))
-        if not found:
-            return None
-        x, y, z = found[0].T
-        for turn in reversed(range(quarter)):
-            # np.rot90 takes column x of a picture of some width to row width - x.
-            x, y = rgb.shape[1 - turn % 2] - y, x
-        return np.stack([x, y, z], axis=1)
+        return turned_back(found[0], rgb, quarter) if found else None
 
     def mesh(self, rgb: np.ndarray, limit: int = 1) -> list[np.ndarray]:
         """The landmarker alone: the faces of a contiguous RGB picture, each float64 [468, 3]."""
@@ -111,6 +105,15 @@ class FaceDetector:
             return None
         seen = (face + np.array([*corner, 0]) for face in self.mesh(square, 1))
         return next((face for face in seen if _around(face, centre)), None)
+
+
+def turned_back(points: np.ndarray, picture: np.ndarray, quarter: int) -> np.ndarray:
+    """Landmarks [..., 3] found in np.rot90(picture, quarter), in the pixels of the picture as it is."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    for turn in reversed(range(quarter)):
+        # np.rot90 takes column x of a picture of some width to row width - x.
+        x, y = picture.shape[1 - turn % 2] - y, x
+    return np.stack([x, y, z], axis=-1)
 
 
 def _place(face: np.ndarray) -> Place:

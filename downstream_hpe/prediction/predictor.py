@@ -183,9 +183,8 @@ class Predictor:
                 )
             raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
         if "confidence" in found:
-            # No surer of a pose than of there being a face.
-            plausible = FaceShapes.load().plausibility(points).astype(np.float32)
-            found["confidence"] = np.minimum(found["confidence"], plausible)
+            # The graph takes it that there is a face.
+            found["confidence"] *= FaceShapes.load().share(points).astype(np.float32)
         return _pose(found)
 
     def graph(self, points: np.ndarray) -> dict[str, np.ndarray]:
