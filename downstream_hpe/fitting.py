@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from downstream_hpe.errors import UsageError
+from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.evaluation.estimators import compare, estimators
 from downstream_hpe.evaluation.reference import mean_face
 from downstream_hpe.evaluation.scores import Evaluation, summary, within_bounds
@@ -27,6 +27,7 @@ from downstream_hpe.manifold.decomposition import PAPER_RANKS, Ranks, decompose
 from downstream_hpe.manifold.plot import plot_manifolds
 from downstream_hpe.manifold.tensor_model import TENSOR_FILE, TensorModel
 from downstream_hpe.networks.confidence import Confidence, calibrate, level_faces
+from downstream_hpe.prediction.plausibility import FaceShapes
 from downstream_hpe.prediction.predictor import MODEL_FILE
 from downstream_hpe.tables.missing import Missing
 from downstream_hpe.tables.pose_zero import common_zero
@@ -47,11 +48,14 @@ LITTLE = 0.5
 @dataclass(frozen=True)
 class FitSettings:
     """recipe: "continuous" or "paper". extra: further datasets, at any poses, that only the networks
-    learn from. validation: share of subjects held out where no dataset has a validation split of its
-    own; 0: none, and then there is no confidence either."""
+    learn from. calibrate: datasets that the confidence is calibrated on instead of the subjects held out;
+    whoever was trained on is left out. validation: share of subjects held out where no dataset has a
+    validation split of its own; 0: none, and then there is no confidence either, unless calibrate says
+    what it is to come from."""
 
     recipe: str = "continuous"
     extra: tuple[str, ...] = ()
+    calibrate: tuple[str, ...] = ()
     ranks: Ranks = PAPER_RANKS
     missing: Missing = "fail"
     normalisation: Normalisation = "rms"
@@ -99,10 +103,11 @@ def fit(
     if settings.extra and not recipe.continuous:
         raise UsageError("the paper's recipe learns from a grid alone; leave out --extra or its recipe")
     every = [dataset, *map(Path, settings.extra)]
-    zero = common_zero(every)
+    zero = common_zero([*every, *map(Path, settings.calibrate)])
     trained, held_out = _subjects(every, settings)
     rows = Rows.joined([read_rows(path) for path in every])
     mine, theirs = (rows.take(np.isin(rows.subjects, sorted(some))) for some in (trained, held_out))
+    judges = _judges(settings.calibrate, trained) if settings.calibrate else theirs
     model, card = _tensor_model(dataset, trained, mean_face(mine), settings, folder, note)
     note(f"{len(mine)} faces of {len(trained)} subjects; held out: {len(theirs)} of {len(held_out)}")
 
@@ -110,8 +115,9 @@ def fit(
     network = train(mine, model, recipe, folder, progress)
     ranges = model.manifolds.range_deg
     weights = Weights(network, settings.normalisation, ranges, None, tuple(sorted(trained)), zero)
-    if len(theirs):
-        weights = replace(weights, confidence=_confidence(weights, mine, theirs))
+    if len(judges):
+        weights = replace(weights, confidence=_confidence(weights, mine, judges))
+        note(f"confidence calibrated on {len(judges)} faces of {len(set(judges.subjects))} subjects")
     weights.save(folder / NETWORK_FILE)
     export_onnx(weights, folder / MODEL_FILE)
     card |= {
@@ -212,8 +218,17 @@ def unlearnt(evaluations: Sequence[Evaluation]) -> list[str]:
     ]
 
 
+def _judges(datasets: Sequence[str], trained: set[str]) -> Rows:
+    """The rows of subjects that were not trained on. DataError: there are none."""
+    rows = Rows.joined([read_rows(path) for path in datasets])
+    judges = rows.take(~np.isin(rows.subjects, sorted(trained)))
+    if not len(judges):
+        raise DataError(f"{', '.join(datasets)}: every subject is trained on; calibrate on others")
+    return judges
+
+
 def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:
-    """Calibrated on the faces held out, at all their poses."""
+    """Calibrated on faces that were not trained on, at all their poses."""
     import torch
 
     features = normalise(theirs.landmarks, weights.normalisation).reshape(len(theirs), -1)
@@ -221,7 +236,8 @@ def _confidence(weights: Weights, mine: Rows, theirs: Rows) -> Confidence:
         ypr_deg = weights.network(torch.from_numpy(features.astype(np.float32))).numpy().astype(np.float64)
     rotation = rotation_from_angles(ypr_deg)
     faces = level_faces(mine.landmarks, mine.rotation, weights.normalisation)
-    return calibrate(faces, weights.range_deg, features, ypr_deg, rotation, theirs.rotation)
+    share = FaceShapes.load().share(theirs.landmarks.astype(np.float64))
+    return calibrate(faces, weights.range_deg, features, ypr_deg, rotation, theirs.rotation, share)
 
 
 def _subjects(datasets: Sequence[Path], settings: FitSettings) -> tuple[set[str], set[str]]:

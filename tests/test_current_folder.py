@@ -169,7 +169,7 @@ def test_python_is_started_in_one_place() -> None:
     starts = re.compile(
         r"sys\.executable|^\s*(import|from) multiprocessing|ProcessPoolExecutor", re.MULTILINE
     )
-    for package in ("generator", "blender_addon", "downstream_hpe"):
+    for package in ("generator", "blender_addon", "downstream_hpe", "litert_faces"):
         for path in ROOT.glob(f"{package}/**/*.py"):
             if path.relative_to(ROOT).as_posix() not in allowed:
                 assert not starts.search(path.read_text(encoding="utf-8")), (

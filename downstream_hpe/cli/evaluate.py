@@ -37,7 +37,7 @@ def evaluate(
     model: Annotated[str, typer.Argument(help="A model folder, an .onnx file, or the name of a model.")],
     dataset: Annotated[Path, typer.Argument(help="A dataset; subjects the model has seen are left out.")],
     layout: Annotated[
-        LayoutName, typer.Option("--format", help="headturn, or labelled photographs; these need mediapipe.")
+        LayoutName, typer.Option("--format", help="headturn, or labelled photographs; these need a detector.")
     ] = LayoutName.headturn,
     split: Annotated[str | None, typer.Option(help="Only this split.")] = None,
     reference: Annotated[
@@ -53,6 +53,9 @@ def evaluate(
     folds: Annotated[
         int, typer.Option(min=2, max=1000, help="Folds of subjects, to take a constant rotation out.")
     ] = 5,
+    detector: Annotated[
+        str | None, typer.Option(help="Who finds faces in photographs, as predict has it.")
+    ] = None,
     report: Annotated[Path | None, typer.Option("--out", help="Folder for tables and plots.")] = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -71,7 +74,9 @@ def evaluate(
         raise UsageError("--all scores every label, and --protocol says which; give one of them")
     if protocol is not None:
         check_protocol(protocol.value, layout.value)
-    predictor = Predictor.load(model)
+    if detector is not None and layout is LayoutName.headturn:
+        raise UsageError("--detector looks at photographs; the rows of a dataset have their landmarks")
+    predictor = Predictor.load(model, detector=detector)
     face = None if reference is None else load_reference(reference)
     every = model_estimators(model, predictor, face)
     if layout is LayoutName.headturn:

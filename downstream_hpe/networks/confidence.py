@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: MIT
 """How sure an estimate is: the calibrated probability that its geodesic error is below 5 degrees.
 
-Landmarks turned back by the estimate should be a level face. How they are not is put into four numbers,
-and where the estimate lies into two an angle; a logistic function of them is fitted to faces that were
-held out. No weight may be positive, and each has a floor, so that whatever was never seen, a pose beyond
-the range or no face at all, makes the estimate less sure.
+The squared error to be expected is a sum of parts, none negative. Landmarks turned back by the estimate
+should be a level face: how far they are from it is put into three numbers, and where the estimate lies into
+two an angle. Their weights are fitted to faces that were not trained on; each has a floor, so that whatever
+was never seen, a pose beyond the range or no face at all, makes the estimate less sure.
+
+Two angles that are off by normal errors of mean square V in all are off by less than t with the probability
+1 - exp(-t^2 / V), Rayleigh's distribution; of three, the one that is found best, roll, counts little.
+
+That is for landmarks that are of a face; :mod:`downstream_hpe.prediction.plausibility` says how far they are.
 """
 
 from __future__ import annotations
@@ -13,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import expit
 
 from downstream_hpe.errors import ModelError
 from downstream_hpe.geometry.face_mesh import FEATURES, POINTS
@@ -23,12 +27,26 @@ from downstream_hpe.geometry.normalise import Normalisation, normalise
 COMPONENTS = 24
 """Directions in which level faces differ, the pose's own distortions among them."""
 TURNS = 3
-QUANTITIES = ("outside", "shape", "turn", "yaw", "pitch", "roll", "beyond yaw", "beyond pitch", "beyond roll")
-FLOORS = np.array([0.5, 0.5, 0.3, 0.0, 0.0, 0.0, 8.0, 8.0, 8.0])
-"""Least weights: about half a unit of the logit for a typical residual, 8 for BEYOND_DEG beyond the range."""
+QUANTITIES = (
+    *("outside", "shape", "turn"),
+    *("strange outside", "strange shape", "strange turn"),
+    *("yaw", "pitch", "roll"),
+    *("beyond yaw", "beyond pitch", "beyond roll"),
+)
+UNITS = np.array([25.0] * 9 + [400.0] * 3)
+"""What weights are measured in, square degrees: an error of SURE_DEG for a face like those trained on and at
+the range's edge, and of BEYOND_DEG so far beyond it."""
+FLOORS = np.array([0.04, 0.04, 0.04, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * UNITS
+"""Least weights: what is strange is off, and beyond the range by as much as it is beyond."""
+STRANGE = 2.5
+"""Residuals above so many times those of the training faces are of no face, or of another's pose."""
+LEAST = 1.0
+"""Square degrees that even the plainest face leaves open."""
 BEYOND_DEG = 20.0
 PRIOR = 1e-3
+"""On the squares of what weights, in UNITS, have above their floors: a few rows decide nothing."""
 _SAMPLE = 4000
+_LEAST_CHANCE = 1e-9
 _LEAST_SCALE = 0.05
 """Of a sum of squares over the face: points 1 % of its radius off, which any detector is."""
 
@@ -40,7 +58,7 @@ class Confidence:
     mean float64 [1404]: the mean level face. basis float64 [1404, 3 + K]: orthonormal; turns of that
     face about the three axes, then components of shape. scale float64 [3 + K + 1]: what the squares
     of the coefficients, and of what the basis leaves, are divided by. range_deg float64 [3, 2].
-    weights float64 [9] of QUANTITIES, bias.
+    weights float64 [12] of QUANTITIES and bias: square degrees.
     """
 
     mean: np.ndarray
@@ -55,11 +73,10 @@ class Confidence:
 
         features: float [N, 1404], normalised landmarks. ypr_deg [N, 3], rotation [N, 3, 3]: the estimate.
         """
-        logit = self.bias - self.quantities(features, ypr_deg, rotation) @ self.weights
-        return expit(logit)
+        return _below(self.bias + self.quantities(features, ypr_deg, rotation) @ self.weights)
 
     def quantities(self, features: np.ndarray, ypr_deg: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """float64 [N, 9], none negative; about 1 for a face like those trained on, at the range's edge, or
+        """float64 [N, 12], none negative; about 1 for a face like those trained on, at the range's edge, or
         BEYOND_DEG beyond it."""
         level = np.asarray(features, dtype=np.float64).reshape(-1, POINTS, 3) @ rotation
         residual = level.reshape(len(level), -1) - self.mean
@@ -71,7 +88,9 @@ class Confidence:
         place = np.abs(ypr_deg - middle)
         beyond = np.maximum(place - half, 0) / BEYOND_DEG
         inside = np.minimum(place, half) / half
-        return np.column_stack([*np.sqrt([rest, shape, turn]), np.square(inside), np.square(beyond)])
+        sizes = np.sqrt(np.column_stack([rest, shape, turn]))
+        strange = np.maximum(sizes - STRANGE, 0)
+        return np.concatenate([sizes, np.square(np.hstack([strange, inside, beyond]))], axis=1)
 
 
 def level_faces(
@@ -102,13 +121,15 @@ def calibrate(
     ypr_deg: np.ndarray,
     rotation: np.ndarray,
     true: np.ndarray,
+    share: np.ndarray,
 ) -> Confidence:
-    """Fit the logistic function to estimates of faces that were held out.
+    """Fit the weights to estimates of faces that were not trained on.
 
     Parameters
     ----------
     faces: of :func:`level_faces`. features: float [N, 1404]. ypr_deg [N, 3] and rotation [N, 3, 3]:
-    estimates; true [N, 3, 3]: R_C.
+    estimates; true [N, 3, 3]: R_C. share float [N]: what the probability is multiplied by before it is
+    given, of :meth:`downstream_hpe.prediction.plausibility.FaceShapes.share`.
 
     Raises
     ------
@@ -117,19 +138,26 @@ def calibrate(
     if not np.isfinite(ypr_deg).all():
         raise ModelError("an estimate of a held-out face is not finite; train again with another seed")
     blank = Confidence(*faces, np.asarray(range_deg, dtype=np.float64), np.zeros(len(QUANTITIES)), 0.0)
-    given = blank.quantities(features, ypr_deg, rotation)
+    units, floors = np.array([SURE_DEG**2, *UNITS]), np.array([LEAST, *FLOORS])
+    quantities = blank.quantities(features, ypr_deg, rotation)
+    given = np.column_stack([np.ones(len(quantities)), quantities]) * units
     sure = geodesic_errors(rotation, true) < SURE_DEG
 
     def loss(parameters: np.ndarray) -> tuple[float, np.ndarray]:
-        bias, weights = parameters[0], parameters[1:]
-        logit = bias - given @ weights
-        chance = expit(logit)
-        value = np.mean(np.logaddexp(0, logit) - sure * logit) + PRIOR * np.square(parameters).sum()
-        slope = chance - sure
-        gradient = np.concatenate([[slope.mean()], -(slope[:, None] * given).mean(axis=0)])
-        return float(value), gradient + 2 * PRIOR * parameters
+        """Cross entropy and its gradient by the weights, in units."""
+        above = parameters - floors / units
+        exponent = -(SURE_DEG**2) / (given @ parameters)
+        said = np.clip(-share * np.expm1(exponent), _LEAST_CHANCE, 1 - _LEAST_CHANCE)
+        value = -np.mean(np.log(np.where(sure, said, 1 - said))) + PRIOR * np.square(above).sum()
+        slope = np.where(sure, 1 / said, -1 / (1 - said)) * share * np.exp(exponent) * np.square(exponent)
+        return float(value), given.T @ slope / (len(given) * SURE_DEG**2) + 2 * PRIOR * above
 
-    start = np.concatenate([[2.0], FLOORS])
-    bounds = [(None, None), *((floor, None) for floor in FLOORS)]
-    found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x
+    start = np.maximum(floors / units, 0.5)
+    bounds = [(floor, None) for floor in floors / units]
+    found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x * units
     return Confidence(*faces, blank.range_deg, found[1:], float(found[0]))
+
+
+def _below(squared_deg: np.ndarray) -> np.ndarray:
+    """Probability of an error below SURE_DEG where its expected square is given."""
+    return -np.expm1(-(SURE_DEG**2) / squared_deg)

@@ -15,9 +15,10 @@ from scipy.linalg import block_diag
 from torch import nn
 
 from downstream_hpe.geometry.face_mesh import FEATURES, LEFT_EYE, NOSE_TIP, POINTS, RIGHT_EYE
+from downstream_hpe.geometry.metrics import SURE_DEG
 from downstream_hpe.geometry.normalise import Normalisation
 from downstream_hpe.model_file import packed
-from downstream_hpe.networks.confidence import BEYOND_DEG, TURNS, Confidence
+from downstream_hpe.networks.confidence import BEYOND_DEG, STRANGE, TURNS, Confidence
 from downstream_hpe.networks.pose_network import REACH, PoseNetwork
 from downstream_hpe.networks.rigid_fit import ENTRIES, LEAST, SHIFT, SQUARINGS, RigidFit
 from downstream_hpe.networks.weights import Weights
@@ -265,16 +266,17 @@ def _confidence(graph: _Graph, confidence: Confidence, scaled: str) -> None:
     sums[1:, 2][turns] = 1 / confidence.scale[:-1][turns]
     squares = graph.add("MatMul", graph.add("Concat", whole, parts, axis=1), graph.array(sums))
     sizes = graph.add("Sqrt", graph.add("Relu", squares))
+    strange = graph.add("Relu", graph.add("Sub", sizes, graph.number(STRANGE)))
     middle, half = confidence.range_deg.mean(axis=1), np.ptp(confidence.range_deg, axis=1) / 2
     place = graph.add("Abs", graph.add("Sub", "ypr_deg", graph.array(middle)))
     beyond = graph.add("Relu", graph.add("Sub", place, graph.array(half)))
     inside = graph.add("Sub", place, beyond)
-    angles = graph.add("Concat", inside, beyond, axis=1)
-    # Their units are degrees here; the weights take them as Confidence.quantities has them.
-    squared = graph.add("Mul", angles, angles)
+    # The angles' units are degrees here; the weights take them as Confidence.quantities has them.
+    parts = graph.add("Concat", strange, inside, beyond, axis=1)
+    squared = graph.add("Mul", parts, parts)
     quantities = graph.add("Concat", sizes, squared, axis=1)
-    units = np.concatenate([np.ones(3), half**2, np.full(3, BEYOND_DEG**2)])
-    bias = np.array([confidence.bias])
-    logit = graph.linear(quantities, -(confidence.weights / units)[None], bias)
-    chance = graph.add("Sigmoid", logit)
+    units = np.concatenate([np.ones(6), half**2, np.full(3, BEYOND_DEG**2)])
+    expected = graph.linear(quantities, (confidence.weights / units)[None], np.array([confidence.bias]))
+    beyond_it = graph.add("Exp", graph.add("Div", graph.number(-(SURE_DEG**2)), expected))
+    chance = graph.add("Sub", graph.number(1.0), beyond_it)
     graph.add("Reshape", chance, graph.constant(np.array([-1])), output="confidence")

@@ -1,22 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Faces in a picture: MediaPipe Face Mesh, and for faces too small for it a closer look."""
+"""Faces in a picture: Face Mesh, and for faces too small for it a closer look."""
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Callable, Iterator
-from typing import Any
-
 import numpy as np
 
-from downstream_hpe.errors import INSTALL, DataError, ModelError
+from downstream_hpe.errors import DataError
 from downstream_hpe.geometry.face_mesh import POINTS
 from downstream_hpe.geometry.metrics import geodesic_errors
 from downstream_hpe.geometry.rotation import fit_rotation
+from downstream_hpe.prediction.landmarkers import Place, open_landmarker
 from downstream_hpe.prediction.plausibility import FaceShapes
 
-CONFIDENCE = 0.5
 CLOSER = 2.5
 """Side of the square for a closer look, in sizes of the face."""
 DOUBTFUL = 0.8
@@ -27,11 +22,13 @@ LARGE_ENOUGH = 0.3
 
 
 class FaceDetector:
-    """Opens MediaPipe's models when they are first needed. ModelError: mediapipe is not installed."""
+    """Opens its models when they are first needed. ModelError: they are not installed.
 
-    def __init__(self) -> None:
-        self._models: dict[str, Any] = {}
-        self._quiet: set[str] = set()
+    landmarker: see :func:`downstream_hpe.prediction.landmarkers.open_landmarker`.
+    """
+
+    def __init__(self, landmarker: str | None = None) -> None:
+        self._landmarker = open_landmarker(landmarker)
 
     def faces(self, bgr: np.ndarray, limit: int = 1, turned: bool = True) -> np.ndarray:
         """Landmarks of the most prominent faces: float64 [F, 468, 3], 0 <= F <= limit, isotropic pixels,
@@ -87,51 +84,19 @@ class FaceDetector:
     def _turned(self, rgb: np.ndarray, quarter: int) -> np.ndarray | None:
         """The face of a picture turned by so many quarters, in the pixels of the picture as it is."""
         found = self.mesh(np.ascontiguousarray(np.rot90(rgb, quarter)))
-        if not found:
-            return None
-        x, y, z = found[0].T
-        for turn in reversed(range(quarter)):
-            # np.rot90 takes column x of a picture of some width to row width - x.
-            x, y = rgb.shape[1 - turn % 2] - y, x
-        return np.stack([x, y, z], axis=1)
+        return turned_back(found[0], rgb, quarter) if found else None
 
     def mesh(self, rgb: np.ndarray, limit: int = 1) -> list[np.ndarray]:
-        """Face Mesh alone: the faces of a contiguous RGB picture, each float64 [468, 3]."""
+        """The landmarker alone: the faces of a contiguous RGB picture, each float64 [468, 3]."""
+        return self._landmarker.mesh(rgb, limit)
 
-        def create() -> Any:
-            from mediapipe.python.solutions.face_mesh import FaceMesh
-
-            # Each picture on its own, as those were that the models learn from.
-            return FaceMesh(
-                static_image_mode=True,
-                max_num_faces=limit,
-                refine_landmarks=False,
-                min_detection_confidence=CONFIDENCE,
-            )
-
-        height, width = rgb.shape[:2]
-        faces = self._run(f"mesh {limit}", create, rgb, "multi_face_landmarks")
-        points = [np.array([(p.x, p.y, p.z) for p in face.landmark[:POINTS]]) for face in faces]
-        return [face * [width, height, width] for face in points]
+    def _far_faces(self, rgb: np.ndarray) -> list[Place]:
+        """Where a detector that sees smaller faces finds some."""
+        return self._landmarker.far(rgb)
 
     def close(self) -> None:
         """Free the models."""
-        for model in self._models.values():
-            model.close()
-        self._models, self._quiet = {}, set()
-
-    def _run(self, name: str, create: Callable[[], Any], rgb: np.ndarray, result: str) -> Any:
-        # Until a model has found its first face, MediaPipe writes start-up notes to the terminal.
-        with contextlib.nullcontext() if name in self._quiet else _silence():
-            if name not in self._models:
-                try:
-                    self._models[name] = create()
-                except ImportError as error:
-                    raise ModelError(f"mediapipe 0.10.21 is not installed: {INSTALL}") from error
-            found = getattr(self._models[name].process(rgb), result) or []
-        if found:
-            self._quiet.add(name)
-        return found
+        self._landmarker.close()
 
     def _closer(self, rgb: np.ndarray, centre: np.ndarray, size: float) -> np.ndarray | None:
         """The face at centre, pixels, from a square around it; None where none is found there."""
@@ -141,24 +106,17 @@ class FaceDetector:
         seen = (face + np.array([*corner, 0]) for face in self.mesh(square, 1))
         return next((face for face in seen if _around(face, centre)), None)
 
-    def _far_faces(self, rgb: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Centre and size of the faces that the full-range detector sees, pixels, the surest first."""
 
-        def create() -> Any:
-            from mediapipe.python.solutions.face_detection import FaceDetection
-
-            return FaceDetection(model_selection=1, min_detection_confidence=CONFIDENCE)
-
-        height, width = rgb.shape[:2]
-        faces = sorted(self._run("far", create, rgb, "detections"), key=lambda face: -face.score[0])
-        found = []
-        for box in (face.location_data.relative_bounding_box for face in faces):
-            centre = np.array([(box.xmin + box.width / 2) * width, (box.ymin + box.height / 2) * height])
-            found.append((centre, max(box.width * width, box.height * height)))
-        return found
+def turned_back(points: np.ndarray, picture: np.ndarray, quarter: int) -> np.ndarray:
+    """Landmarks [..., 3] found in np.rot90(picture, quarter), in the pixels of the picture as it is."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    for turn in reversed(range(quarter)):
+        # np.rot90 takes column x of a picture of some width to row width - x.
+        x, y = picture.shape[1 - turn % 2] - y, x
+    return np.stack([x, y, z], axis=-1)
 
 
-def _place(face: np.ndarray) -> tuple[np.ndarray, float]:
+def _place(face: np.ndarray) -> Place:
     """Centre [2] and longer side of the box of a face's landmarks."""
     low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
     return (low + high) / 2, float((high - low).max())
@@ -185,16 +143,3 @@ def _around(face: np.ndarray, point: np.ndarray) -> bool:
     """Whether a point lies in the box of a face's landmarks."""
     low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
     return bool(((point >= low) & (point <= high)).all())
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """What native code writes to stderr is lost."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)

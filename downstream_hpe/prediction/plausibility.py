@@ -20,6 +20,9 @@ from downstream_hpe.geometry.face_mesh import CHIN, FOREHEAD
 FACE_SHAPES = Path(__file__).parents[1] / "models" / "face_shapes.npz"
 """Made by scripts/make_face_shapes.py, which prints what its numbers are worth."""
 UPRIGHT_DEG = 60.0
+COUNTS = 0.25
+"""Of the logarithm of plausibility, which was fitted to extremes, so much counts for a confidence: masks and
+upside-down heads stay below a half."""
 SOME = slice(None, None, 3)
 """The landmarks that are looked at: a third says as much."""
 LEAST_LEFT, LEAST_SIZE = 1e-9, 1e-9
@@ -65,6 +68,13 @@ class FaceShapes:
     def plausibility(self, landmarks: np.ndarray) -> np.ndarray:
         """0 to 1, [N]. Arguments as :meth:`quantities`."""
         return expit(self.bias - self.quantities(landmarks) @ self.weights)
+
+    def share(self, landmarks: np.ndarray) -> np.ndarray:
+        """What is left of a confidence where faces are doubtful: 0 to 1, [N]. Arguments as above.
+
+        A root, so that less of what was seen counts: doubtful faces of photographs are often placed well.
+        """
+        return self.plausibility(landmarks) ** COUNTS
 
 
 def quarter_turns(landmarks: np.ndarray) -> np.ndarray:

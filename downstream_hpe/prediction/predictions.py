@@ -23,6 +23,7 @@ from downstream_hpe.prediction.predictor import Pose, Predictor
 from downstream_hpe.prediction.records import Record, record
 from downstream_hpe.prediction.tracks import FaceTracks
 from downstream_hpe.prediction.video import VideoReader, VideoWriter
+from downstream_hpe.prediction.way_up import WayUp
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,8 @@ def predictions(
         except DataError as error:
             leave_out(str(error))
             continue
-        look = _Look(
-            predictor, camera, options.faces, FaceTracks(source.moving and options.smooth), not source.moving
-        )
+        tracks = FaceTracks(source.moving and options.smooth)
+        look = _Look(predictor, camera, options.faces, tracks, WayUp() if source.moving else None)
         if source.moving:
             yield from _video(source, reader, look, options, leave_out)
         else:
@@ -100,17 +100,20 @@ def _video(
 
 @dataclass(frozen=True)
 class _Look:
-    """What is done with each picture or frame of one source. turned: as :meth:`Predictor.faces`; videos keep
-    their rate."""
+    """What is done with each picture or frame of one source. way_up: None of a picture, which is looked at
+    every way up."""
 
     predictor: Predictor
     camera: Camera
     limit: int
     tracks: FaceTracks
-    turned: bool
+    way_up: WayUp | None
 
     def faces(self, image: np.ndarray, time_s: float) -> list[Face]:
-        found = self.predictor.faces(image, self.limit, self.turned)
+        if self.way_up is None:
+            found = self.predictor.faces(image, self.limit, True)
+        else:
+            found = self.way_up.faces(self.predictor, image, self.limit, time_s)
         if not len(found):
             self.tracks.indices(found, time_s)
             return []

@@ -61,26 +61,32 @@ class Predictor:
         trained_subjects: frozenset[str],
         pose_zero: str | None,
         name: str,
+        detector: str | None = None,
     ) -> None:
         self._session = session
         self._name = name
         self._outputs = [value.name for value in session.get_outputs() if value.name in SHAPES]
-        self._detector = FaceDetector()
+        self._detector = FaceDetector(detector)
         self.range_deg = range_deg
         self.trained_subjects = trained_subjects
         self.pose_zero = pose_zero
 
     @staticmethod
-    def load(model: Path | str = DEFAULT_MODEL, *, threads: int = 1) -> Predictor:
+    def load(
+        model: Path | str = DEFAULT_MODEL, *, threads: int = 1, detector: str | None = None
+    ) -> Predictor:
         """model: the name of a model that comes with the package, a model folder of `downstream-hpe fit`,
         or an exported .onnx file.
 
-        The file may come from anywhere: it is read as numbers and arithmetic only, see
+        detector: who finds faces in pictures, see
+        :func:`downstream_hpe.prediction.landmarkers.open_landmarker`.
+        The model may come from anywhere: it is read as numbers and arithmetic only, see
         :mod:`downstream_hpe.prediction.onnx_file`.
 
         Raises
         ------
         ModelError: nothing there, not an ONNX file, or not one that `downstream-hpe export` wrote.
+        UsageError: no such detector.
         """
         file = _file_of(model)
         try:
@@ -110,7 +116,7 @@ class Predictor:
             optional = name == "confidence" and name not in found
             if not optional and found.get(name) != ("tensor(float)", shape):
                 raise ModelError(f"{file}: {name} is not float [N{''.join(f', {n}' for n in shape)}]")
-        return Predictor(session, ranges, subjects, facts.get("pose_zero"), str(file))
+        return Predictor(session, ranges, subjects, facts.get("pose_zero"), str(file), detector)
 
     def in_range(self, ypr_deg: np.ndarray) -> Any:
         """Whether all three angles are among those the model was trained on: float [..., 3] -> bool [...]."""
@@ -177,9 +183,8 @@ class Predictor:
                 )
             raise ModelError(f"{self._name}: gives numbers that are not finite; {EXPORT_AGAIN}")
         if "confidence" in found:
-            # No surer of a pose than of there being a face.
-            plausible = FaceShapes.load().plausibility(points).astype(np.float32)
-            found["confidence"] = np.minimum(found["confidence"], plausible)
+            # The graph takes it that there is a face.
+            found["confidence"] *= FaceShapes.load().share(points).astype(np.float32)
         return _pose(found)
 
     def graph(self, points: np.ndarray) -> dict[str, np.ndarray]:
@@ -198,8 +203,8 @@ class Predictor:
     def from_image(self, bgr: np.ndarray, faces: int = 1, camera: Camera | None = None) -> Pose | None:
         """Pose of the most prominent faces of a picture, at most so many; None where no face is found.
 
-        bgr: uint8 [H, W, 3]. camera: as :meth:`from_landmarks`. Needs mediapipe, which is opened on the
-        first call.
+        bgr: uint8 [H, W, 3]. camera: as :meth:`from_landmarks`. The detector is opened on the first
+        call.
         """
         points = self.faces(bgr, faces)
         return self.from_landmarks(points, camera) if len(points) else None

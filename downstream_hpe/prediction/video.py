@@ -37,7 +37,7 @@ class VideoReader:
 
     Raises
     ------
-    DataError: it cannot be opened. ModelError: OpenCV, which comes with mediapipe, is missing.
+    DataError: it cannot be opened. ModelError: OpenCV is missing.
     """
 
     def __init__(self, source: Path | int) -> None:
@@ -142,5 +142,7 @@ def _opencv() -> Any:
         import cv2
     except ImportError as error:
         raise ModelError(f"OpenCV is not installed: {INSTALL}") from error
-    cv2.setLogLevel(0)
+    opencv: Any = cv2
+    levels = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # so from OpenCV 5 on
+    levels.setLogLevel(0)
     return cv2

@@ -18,7 +18,9 @@ ROTATION = "Rx(-pitch) Ry(yaw) Rz(roll)"
 ANGLE_COLUMNS = tuple(f"{angle}_deg" for angle in ANGLES)
 INDEX_COLUMNS = tuple(f"{angle}_index" for angle in ANGLES)
 HEAD_COLUMNS = ("subject", "expression")
-_TEXTS = {*HEAD_COLUMNS, "split", "projection"}
+WORN = ("mask", "occluder", "glasses", "beard", "headwear", "headphones")
+"""What heads wear, and is before them: columns ``look_...``, whose values are styles."""
+_TEXTS = {*HEAD_COLUMNS, "split", "projection", *(f"look_{kind}" for kind in WORN)}
 _LISTS = {"rotation", "landmarks", "landmarks_exact", "camera", "translation_mm"}
 
 

@@ -97,6 +97,9 @@ def _parts(flag: str, group: list[Setting], value: Any) -> list[Any]:
         if numbers_of_one:
             return [_distributions(flag, [group[0].key] * len(numbers_of_one), value)]
         return _distributions(flag, [setting.key for setting in group], value)
+    if _first_and_further(group):
+        first, *further = value.split(",")
+        return [first, further or None]
     if len(group) > 1 and len({setting.section for setting in group}) == 1:
         parts = numbers(flag, value)
         if len(parts) != len(group):
@@ -138,7 +141,7 @@ def _parameter(flag: str, group: list[Setting], defaults: Mapping[str, Any]) -> 
     kind = _inner(first.kind)
     if kind is bool:
         names = [f"{flag}/--not-{flag.removeprefix('--')}"]
-    elif len(group) > 1 and flag == "--poses":
+    elif len(group) > 1 and (flag == "--poses" or _first_and_further(group)):
         kind = str
     elif len(group) > 1 and len({s.section for s in group}) == 1:
         kind, metavar = str, ",".join(s.key.upper().removesuffix("_DEG").split("_")[-1] for s in group)
@@ -169,10 +172,17 @@ def _help(group: list[Setting]) -> str:
     first, info = group[0], group[0].info
     unit = f" ({info.unit})" if info.unit else ""
     usual = ",".join(_shown(s.default) for s in group) if len({s.section for s in group}) == 1 else ""
+    if _first_and_further(group):
+        usual = str(first.default)
     if first.flag == "--poses" or first.default in (None, ()):
         usual = ""
     text = f"{info.help}{unit}{f'; default {usual}' if usual else ''}"
     return text if text.endswith("?") else f"{text}."
+
+
+def _first_and_further(group: list[Setting]) -> bool:
+    """Whether a flag takes a name and, after commas, further ones."""
+    return [setting.kind for setting in group] == [str, tuple[str, ...]]
 
 
 def _shown(value: Any) -> str:

@@ -266,7 +266,7 @@ def _open_lanes(
         lanes = stack.enter_context(open_executor("local", workers=workers, blender=blender))
     except UsageError as error:  # no Blender, or other panoramas
         return error
-    [outcome] = lanes.run([VersionsOrder(config.landmarks)], lambda: None)
+    [outcome] = lanes.run([VersionsOrder(config.detecting)], lambda: None)
     if outcome.receipt is None:
         return WorkerError(f"nothing can be rendered here: {outcome.error}", outcome.log)
     return lanes

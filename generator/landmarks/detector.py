@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from generator import registries
+from generator.errors import UsageError
 from generator.landmarks.topology import Topology
 from generator.plan.settings import Landmarks
 
@@ -42,5 +44,28 @@ class Detector(Protocol):
 
 def open_detector(landmarks: Landmarks) -> Detector:
     """The detector of some settings. UsageError: an unknown name. WorkerError: it cannot start."""
-    detector: Detector = registries.DETECTORS.get(landmarks.detector)(landmarks.min_confidence)
+    kind = registries.DETECTORS.get(landmarks.detector)
+    detector: Detector = kind.of(landmarks) if hasattr(kind, "of") else kind(landmarks.min_confidence)
     return detector
+
+
+def each_detector(landmarks: Landmarks) -> dict[str, Landmarks]:
+    """The settings of every detector that looks at the images, by its name; that of the columns "detected"
+    and "landmarks" first."""
+    names = (landmarks.detector, *landmarks.also)
+    return {name: replace(landmarks, detector=name, also=()) for name in names}
+
+
+def check_detectors(landmarks: Landmarks) -> None:
+    """UsageError: one is named twice, one finds other points, or a file is missing or not used."""
+    names = [landmarks.detector, *landmarks.also]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise UsageError(f"--detector {','.join(names)}: {twice} is named twice")
+    found = {name: registries.DETECTORS.get(name).topology.name for name in names}
+    if other := next((name for name in names if found[name] != found[names[0]]), None):
+        raise UsageError(
+            f"--detector {','.join(names)}: {other} finds {found[other]}, and {names[0]} {found[names[0]]}; "
+            "all have to find the same points"
+        )
+    if (landmarks.file is None) is ("file" in names):
+        raise UsageError("--detector file and --detector-file PATH go together")

@@ -81,6 +81,12 @@ class BuildConfig:
         """A path setting as an absolute path."""
         return Path(os.path.abspath(self.base / path))
 
+    @property
+    def detecting(self) -> Landmarks:
+        """What a lane is told of landmarks: its file as an absolute path."""
+        file = self.landmarks.file
+        return self.landmarks if file is None else replace(self.landmarks, file=str(self.located(file)))
+
     def moved_to(self, root: Path) -> BuildConfig:
         """The same configuration as a file in the folder root says it: relative paths count from there."""
         values = self.as_dict()

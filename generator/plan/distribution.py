@@ -38,7 +38,8 @@ class Distribution:
     """A distribution of numbers within the limits of a setting, or of texts.
 
     kind: of KINDS. numbers: those behind its name. low, high: of the setting; None is no limit.
-    per_head: one draw for all images of a head. texts: what is chosen from where the setting is a text.
+    per_head: one draw for all images of a person, whatever the expression. texts: what is chosen from where
+    the setting is a text.
     """
 
     kind: str

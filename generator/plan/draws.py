@@ -13,3 +13,8 @@ def draw_seed(seed: int, *names: str) -> tuple[int, ...]:
     """The seed of one draw. names: what is drawn and for what, such as ("poses", subject, expression)."""
     text = "\0".join(names).encode()
     return seed, int.from_bytes(hashlib.sha256(text).digest()[:8], "big")
+
+
+def person_of(head: str) -> str:
+    """The subject of subject/expression, on whom depends what does not change with an expression."""
+    return head.rpartition("/")[0] or head

@@ -148,7 +148,19 @@ class Poses:
 class Landmarks:
     """Who finds the landmarks."""
 
-    detector: str = setting("mediapipe", "Which detector", choices=_registered(registries.DETECTORS))
+    detector: str = setting(
+        "mediapipe", "Which detector; further ones after commas, each with a column of its own",
+        choices=_registered(registries.DETECTORS),
+    )  # fmt: skip
+    also: tuple[str, ...] = setting(
+        (), "Further detectors, each of which gets a column landmarks_NAME", flag="--detector",
+        choices=tuple(Choice(name) for name in registries.DETECTORS),
+    )  # fmt: skip
+    file: str | None = setting(
+        None,
+        "Where the networks of the detector file are: a face_landmarker.task, or mediapipe 0.10.21's wheel",
+        flag="--detector-file", path=True, content=False,
+    )  # fmt: skip
     min_confidence: float = setting(
         0.5, "How sure the detector must be that there is a face", above=0, high=1,
         label="Min. confidence",

@@ -12,7 +12,7 @@ import numpy as np
 from generator.errors import UsageError
 from generator.geometry.camera import framed_margin
 from generator.plan.distribution import TRIES, Distribution, is_choice, parse_choice, parse_distribution
-from generator.plan.draws import draw_seed
+from generator.plan.draws import draw_seed, person_of
 from generator.plan.factors import FACTORS, Factor
 from generator.plan.poses import pose_name
 from generator.plan.settings import Dataset, Render, section_settings
@@ -118,7 +118,7 @@ def _drawn(
     for key, source in sources.items():
         if source is not None:
             name = f"render.{key}"
-            whose = (head,) if source.per_head else (head, pose_name(*pose))
+            whose = (person_of(head),) if source.per_head else (head, pose_name(*pose))
             seed = draw_seed(config.poses.seed, name, *whose, "twin")
             drawing.append((key, source, np.random.default_rng(seed)))
     twin = base

@@ -13,7 +13,7 @@ from generator import registries
 from generator.errors import UsageError
 from generator.geometry.camera import Camera, framing_distance, framing_lens
 from generator.plan.distribution import Distribution
-from generator.plan.draws import draw_seed
+from generator.plan.draws import draw_seed, person_of
 from generator.plan.poses import pose_name
 from generator.plan.render_settings import NOISE
 from generator.plan.settings import Lens, Poses, Render, plain
@@ -102,12 +102,12 @@ def _is_random(render: Render) -> bool:
 def drawn_render(config: Planned, head: str, pose: Pose) -> Render:
     """The settings of one image: each that is a distribution is drawn.
 
-    A draw depends on the seed, the head, the setting's name and, where each image has its own, the pose:
-    not on what else is drawn, nor on which images there are.
+    A draw depends on the seed, the setting's name and the person or, where each image has its own, the head
+    and the pose: not on what else is drawn, nor on which images there are.
     """
     values: dict[str, Any] = {}
     for name, distribution in config.drawn.items():
-        whose = (head,) if distribution.per_head else (head, pose_name(*pose))
+        whose = (person_of(head),) if distribution.per_head else (head, pose_name(*pose))
         rng = np.random.default_rng(draw_seed(config.poses.seed, name, *whose))
         _, key, *place = name.split(".")
         value: Any = distribution.draw(rng)

@@ -16,7 +16,7 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.surroundings import with_triangles
 from generator.landmarks.surface import TOGETHER, Surface
-from generator.plan.draws import draw_seed
+from generator.plan.draws import draw_seed, person_of
 from generator.plan.views import View, Views
 from generator.plan.wear import STYLES, Worn
 from generator.registries import WORN
@@ -111,7 +111,7 @@ class Wardrobe:
     def dress(self, name: str, mesh: HeadMesh, points: np.ndarray, views: Views, things: str = "") -> Outfits:
         """What a head wears in some views.
 
-        name: subject/expression, on which colours and sizes depend. mesh: frame U, mm, pivot at the origin;
+        name: subject/expression; colours and sizes are the subject's. mesh: frame U, mm, pivot at the origin;
         the very one, as long as it is the same. points: float [P, 3], landmarks on it, frame C, mm.
         things: folder of a user's own.
         """
@@ -144,7 +144,7 @@ class Wardrobe:
         others = {other: getattr(view.look, other) for other in maker.minds}
         key = (kind, style, variant, *others.values())
         if key not in self._made:
-            rng = np.random.default_rng(draw_seed(0, "worn", self._name, kind, style, variant))
+            rng = np.random.default_rng(draw_seed(0, "worn", person_of(self._name), kind, style, variant))
             try:
                 if style not in STYLES.get(kind, (style,)):
                     raise CannotWear(f"there is no {style!r}")

@@ -88,6 +88,10 @@ def some_options(draw: st.DrawFn) -> tuple[list[str], Values]:
             arguments += typed(group[0], value)
             for known in group:
                 said[known.section][known.key] = value
+        elif flag == "--detector":
+            first, *further = draw(st.lists(value_of(group[0], TYPED), min_size=1, max_size=3))
+            arguments.append(f"{flag}={','.join([first, *further])}")
+            said["landmarks"] |= {"detector": first, **({"also": tuple(further)} if further else {})}
         elif len(group) > 1:
             values = [draw(value_of(known, TYPED)) for known in group]
             arguments.append(f"{flag}={','.join(map(str, values))}")
@@ -125,6 +129,7 @@ def test_every_setting_has_an_option_and_no_two_share_one_by_accident() -> None:
         "--seed": ["heads.seed", "poses.seed"],
         "--poses": ["poses.kind", "poses.count", "poses.path"],
         "--light": ["render.light_yaw_deg", "render.light_pitch_deg"],
+        "--detector": ["landmarks.detector", "landmarks.also"],
         **{f"--lamp{k}": [f"render.lamp{k}_yaw_deg", f"render.lamp{k}_pitch_deg"] for k in (1, 2, 3)},
     }
     names = [flag.removeprefix("--") for flag in FLAGS]

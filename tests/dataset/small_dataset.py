@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pyarrow as pa
 from PIL import Image, ImageDraw
 
 from generator.dataset.format.anchors_table import HeadAnchors, write_anchors
-from generator.dataset.format.columns import ImageMode
+from generator.dataset.format.columns import ImageMode, further_column
 from generator.dataset.format.heads_table import HeadRow, write_heads
 from generator.dataset.format.manifest import (
     Manifest,
@@ -121,6 +122,14 @@ def unit_rows(
     )
 
 
+def shifted(unit: UnitRows, off: tuple[float, float]) -> np.ndarray:
+    """Landmarks of every row, so many pixels off: float32 [N, 468, 3]."""
+    [camera] = unit.cameras
+    points = face_points() @ np.swapaxes(unit.rotation, 1, 2) + camera.translation_mm
+    depth = (points[..., 2:] - camera.distance_mm) * camera.focal_px / camera.distance_mm
+    return np.concatenate([camera.project(points) + off, depth], axis=-1).astype(np.float32)
+
+
 def head_row(subject: str, split: str) -> HeadRow:
     return HeadRow(
         subject=subject,
@@ -176,10 +185,12 @@ def build_dataset(
     camera: Camera = CAMERA,
     twins: tuple[str, ...] = (),
     render: dict[str, Any] | None = None,
+    also: Mapping[str, tuple[float, float]] | None = None,
 ) -> Manifest:
     """A finished dataset of heads x plan, a part for every chunk of poses.
 
-    twins: factors of the look. render: further settings of it.
+    twins: factors of the look. render: further settings of it. also: further detectors, and by how many
+    pixels each is off, right and down; they find every face.
     """
     configuration = {
         "poses": {"kind": plan.kind},
@@ -190,15 +201,23 @@ def build_dataset(
             "projection": camera.projection,
             **(render or {}),
         },
+        **({"landmarks": {"detector": "mediapipe", "also": [*also]}} if also else {}),
         "dataset": {"images": images, **({"twins": [*twins]} if twins else {})},
     }
-    schema = part_schema(images, VERSIONS, configuration_digest(common_values(configuration)))
+    also = also or {}
+    schema = part_schema(
+        images, VERSIONS, configuration_digest(common_values(configuration)), also=tuple(also)
+    )
     root.mkdir(parents=True)
     parts = []
     for number, head in enumerate(heads):
         name = head.subject if re.fullmatch(r"\w+", head.subject, re.ASCII) else f"h{number}"
         for start in range(0, len(plan), chunk):
             unit = unit_rows(head, plan, slice(start, start + chunk), camera)
+            unit = replace(
+                unit,
+                extra={**unit.extra, **{further_column(n): shifted(unit, off) for n, off in also.items()}},
+            )
             if render:
                 unit = replace(unit, looks=(recorded_config(configuration, root).render.look,))
             parts.append(commit_unit(unit, schema, root, f"{name}-{start}"))

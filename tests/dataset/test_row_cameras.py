@@ -125,7 +125,7 @@ def test_a_camera_that_is_not_the_heads_is_found(tmp_path: Path, monkeypatch: py
 
 
 def test_the_report_and_exports_take_the_rows_camera(dataset: Path, tmp_path: Path) -> None:
-    data = report_data(dataset, lambda _: None)
+    [data] = report_data(dataset, lambda _: None)["detectors"]
     assert data["overall"]["compared"] == 32
     assert data["overall"]["distance_px"] < 1e-3, "an ideal detector, whatever the camera"
     assert data["overall"]["geodesic_deg"] < 1e-3

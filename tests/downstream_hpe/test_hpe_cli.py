@@ -87,6 +87,15 @@ def test_fit_holds_out_the_validation_split(model):
     assert by_name["encoder + heads"]["mae"] < 0.5 * by_name["constant zero"]["mae"]
 
 
+def test_confidence_is_calibrated_on_others(dataset, extra, tmp_path, monkeypatch, capsys):
+    """On faces of its own, if it is told to, and never on whom it was trained on."""
+    short = ["fit", dataset, "--missing", "frontal", "--epochs", "1", "--threads", "1", "--calibrate"]
+    assert run(*short, extra, "--out", tmp_path / "model", monkeypatch=monkeypatch) == 0
+    assert "confidence calibrated on 128 faces of 2 subjects" in capsys.readouterr().err
+    assert run(*short, extra, "--extra", extra, "--out", tmp_path / "none", monkeypatch=monkeypatch) == 1
+    assert "every subject is trained on; calibrate on others" in capsys.readouterr().err
+
+
 def test_evaluate_leaves_out_what_was_trained_on(model, dataset, tmp_path, monkeypatch, capsys):
     assert run("evaluate", model, dataset, "--out", tmp_path / "r", "--json", monkeypatch=monkeypatch) == 0
     found = json.loads(capsys.readouterr().out)
@@ -161,6 +170,7 @@ MISTAKES = {
     ),
     "other ranks": (["fit", "nowhere", "--out", "m", "--ranks", "5,4,3,3"], 2, "only ID is free"),
     "no model": (["evaluate", "nowhere", "nowhere"], 1, "nowhere: no such model"),
+    "a detector of rows": (["evaluate", "m", "d", "--detector", "litert"], 2, "looks at photographs"),
     "nothing to export": (["export", "m"], 2, "nothing to write"),
     "export nothing": (["export", "m", "--onnx", "o"], 1, "not a readable model file"),
 }

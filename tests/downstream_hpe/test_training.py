@@ -140,13 +140,17 @@ def confidence(rows):
     estimates = some.ypr_deg + rng.normal(scale=3, size=(300, 3))
     features = normalise(some.landmarks).reshape(300, -1)
     faces = level_faces(rows.landmarks, rows.rotation, "rms")
-    return calibrate(faces, RANGE, features, estimates, rotation_from_angles(estimates), some.rotation)
+    rotation = rotation_from_angles(estimates)
+    return calibrate(faces, RANGE, features, estimates, rotation, some.rotation, np.ones(300))
 
 
-@pytest.mark.parametrize("normalisation", ["rms", "eyes"])
-def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normalisation):
+@pytest.mark.parametrize(("normalisation", "share"), [("rms", 1), ("eyes", 1), ("rms", 0.01)])
+def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normalisation, share):
     torch.manual_seed(0)
     network = PoseNetwork().eval()
+    # What an untrained network answers is small: within the range, or beyond a share of it. All counts.
+    weights = np.array([*confidence.weights[:6], 3e3, 4e3, 5e3, 4e4, 5e4, 6e4])
+    confidence = replace(confidence, range_deg=share * RANGE, weights=weights)
     export_onnx(Weights(network, normalisation, RANGE, confidence), tmp_path / "model.onnx")
     predictor = Predictor.load(tmp_path)
     raw = (200 + 73 * rows.landmarks[::50]).astype(np.float32)
@@ -158,6 +162,8 @@ def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normal
         expected = network(torch.from_numpy(features)).numpy()
     np.testing.assert_allclose(pose.ypr_deg, expected, atol=5e-5)
     np.testing.assert_allclose(pose.rotation, rotation_from_angles(pose.ypr_deg), atol=1e-5)
+    beyond = np.abs(pose.ypr_deg) > share * RANGE[:, 1]
+    assert (beyond == (share < 1)).all()
     chance = confidence.of(features, pose.ypr_deg, pose.rotation)
     np.testing.assert_allclose(pose.confidence, chance, atol=1e-5)
     np.testing.assert_array_equal(predictor.range_deg, RANGE)
@@ -190,7 +196,7 @@ def test_saved_models_come_back(rows, model, confidence, tmp_path):
     again = TensorModel.load(tmp_path / "t.safetensors")
     found = again.estimator().from_landmarks(rows.landmarks[:20])
     assert np.abs(found.ypr_deg - rows.ypr_deg[:20]).max() < 0.01
-    with pytest.raises(ModelError, match="expected 'downstream-hpe network 2'"):
+    with pytest.raises(ModelError, match="expected 'downstream-hpe network 3'"):
         Weights.load(tmp_path / "t.safetensors")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from generator.content import content_versions
-from generator.dataset.format.columns import ImageMode
+from generator.dataset.format.columns import ImageMode, further_column
 from generator.dataset.format.files import check_there
 from generator.dataset.format.part import commit_unit
 from generator.dataset.format.schema import part_schema
@@ -125,12 +125,17 @@ class NoRenderer:
             images=images,
             image_suffix=f".{order.image_format}",
             factor=order.factor,
+            extra={
+                further_column(name): np.full((count, points, 3), 9.0, dtype=np.float32)
+                for name in order.landmarks.also
+            },
         )
         schema = part_schema(
             cast(ImageMode, order.images),
             self._versions(),
             order.configuration_digest,
             twins=bool(order.factor),
+            also=order.landmarks.also,
         )
         check_there(Path(order.root))
         return Built(commit_unit(rows, schema, Path(order.root), order.unit), {}, self._versions())

@@ -84,7 +84,7 @@ class NoseFinder:
 
 def test_a_detector(added, parametric_heads: Path, tmp_path: Path) -> None:
     """It places heads, finds landmarks, and its name and confidence decide what a unit is."""
-    with pytest.raises(UsageError, match=r"landmarks\.detector: Input should be 'mediapipe', got 'nose'"):
+    with pytest.raises(UsageError, match=r"landmarks\.detector: Input should be 'mediapipe', .*, got 'nose'"):
         load_config(None, {"landmarks": {"detector": "nose"}})
     added(registries.DETECTORS, "nose", NoseFinder)
     given = {"detector": "nose", "min_confidence": 0.25}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import re
 import sys
 import traceback
 import warnings
@@ -26,7 +27,7 @@ def main() -> None:
     name, findings, *options = sys.argv[1:]
     warnings.simplefilter("ignore")
     # What a target imports it imports at its first call, and only what is imported here is followed.
-    with atheris.instrument_imports(include=["generator", "downstream_hpe"]):
+    with atheris.instrument_imports(include=["generator", "downstream_hpe", "litert_faces"]):
         import targets
 
         target, promised = targets.TARGETS[name], targets.promised()
@@ -55,7 +56,7 @@ def main() -> None:
 
 def _note(error: Exception, data: bytes, folder: Path, name: str) -> None:
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [f for f in frames if "/generator/" in f.filename or "/downstream_hpe/" in f.filename] or list(
+    ours = [f for f in frames if re.search("/(generator|downstream_hpe|litert_faces)/", f.filename)] or list(
         frames
     )
     kind = f"{type(error).__name__} {Path(ours[-1].filename).name}:{ours[-1].lineno}"

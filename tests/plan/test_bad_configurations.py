@@ -13,7 +13,7 @@ from generator.plan.config import load_config
 CASES = {
     "[render]\nresolutoin = 64": "render.resolutoin: no such setting; there is resolution",
     "[heads]\nsead = 1": "heads.sead: no such setting; there is seed",
-    "[landmarks]\nx = 1": "landmarks.x: no such setting; there is detector, min_confidence",
+    "[landmarks]\nx = 1": "landmarks.x: no such setting; there is detector, also, file, min_confidence",
     "[rendr]\nresolution = 64": "rendr: no such section; there is render",
     "[render]\nlens_mm = 0": "render.lens_mm: Input should be greater than or equal to 10, got 0",
     '[render]\npreset = "fst"': "render.preset: Input should be 'fast' or 'quality', got 'fst'",

@@ -128,6 +128,7 @@ def test_a_draw_a_head_is_the_same_for_all_its_images() -> None:
     looks = {view.look for view in plan_views(ours, "amy/neutral", 120.0, POSES)}
     [other] = {view.look for view in plan_views(ours, "bob/neutral", 120.0, POSES)}
     assert len(looks) == 1 and other not in looks
+    assert looks == {view.look for view in plan_views(ours, "amy/smile", 120.0, POSES)}, "of the person"
 
 
 def test_each_number_of_a_colour_may_be_drawn() -> None:

@@ -19,11 +19,12 @@ import pyarrow as pa
 
 from generator.landmarks.topology import Topology
 from generator.plan.settings import Look, section_settings
+from generator.registries import DETECTORS
 
 if TYPE_CHECKING:
     from generator.dataset.format.unit_rows import UnitRows
 
-SCHEMA_VERSION = "1.3.0"
+SCHEMA_VERSION = "1.4.0"
 """A new column raises the middle number, and says so in its ``since``; readers of the old one go on."""
 
 ImageMode = Literal["none", "files", "embedded"]
@@ -262,5 +263,22 @@ TWINS: dict[str, Column] = {
 }  # fmt: skip
 """What a table of twins has besides, by name."""
 
-EVERY: Mapping[str, Column] = ChainMap(ROWS, TWINS)
-"""The columns of both."""
+
+def further_column(detector: str) -> str:
+    """The column of a further detector."""
+    return f"landmarks_{detector}"
+
+
+FURTHER: dict[str, Column] = {
+    further_column(name): Column(
+        further_column(name), PerPoint(pa.float32(), 3),
+        f"landmarks as the further detector {name} finds them; NaN where it finds no face", "landmarks",
+        replay=Compare("floats", "px"), since="1.4.0",
+    )
+    for name in DETECTORS
+}  # fmt: skip
+"""What a table has besides where further detectors looked at its images, by name; see
+:mod:`generator.dataset.format.further`."""
+
+EVERY: Mapping[str, Column] = ChainMap(ROWS, TWINS, FURTHER)
+"""The columns of all."""

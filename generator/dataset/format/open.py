@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
 
-from generator.dataset.format.columns import ROWS
+from generator.dataset.format.columns import EVERY
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.files import one_line
 from generator.dataset.format.guard import check_texts, dataset_file
@@ -102,7 +102,7 @@ def as_array(table: pa.Table | pa.RecordBatch, name: str) -> np.ndarray:
         column = column.combine_chunks()
     if not pa.types.is_fixed_size_list(column.type):
         return column.to_numpy(zero_copy_only=False)
-    values = ROWS[name].values_a_point if name in ROWS else 0
+    values = EVERY[name].values_a_point if name in EVERY else 0
     shape = (-1, values) if values > 1 else (column.type.list_size,)
     return column.flatten().to_numpy(zero_copy_only=False).reshape(len(column), *shape)
 

@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import pyarrow as pa
 
 from generator.dataset.format.columns import (
+    FURTHER,
     ROWS,
     SCHEMA_VERSION,
     TWINS,
     ImageMode,
     columns_at,
+    further_column,
     version_number,
 )
 from generator.errors import DatasetError, UsageError
@@ -56,15 +58,17 @@ def part_schema(
     topology: Topology = FACE_MESH,
     schema_version: str = SCHEMA_VERSION,
     twins: bool = False,
+    also: Sequence[str] = (),
 ) -> pa.Schema:
     """Schema of one part: columns in order, none nullable, and the metadata.
 
     versions: name and version of every package that decides the content.
     configuration_digest: of :func:`generator.plan.first_settings.common_values`.
     topology: what the landmarks are. schema_version: an earlier one has only the columns of its time.
-    twins: of a part of twins.
+    twins: of a part of twins. also: names of further detectors.
     """
-    table = {**ROWS, **TWINS} if twins else ROWS
+    further = {name: FURTHER[name] for name in map(further_column, also)}
+    table = {**ROWS, **further, **(TWINS if twins else {})}
     columns = [column for column in columns_at(table, schema_version) if column.is_in(images)]
     metadata = {
         "headturn.schema_version": schema_version,

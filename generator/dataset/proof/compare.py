@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from generator.dataset.format.columns import ROWS, Compare
+from generator.dataset.format.columns import FURTHER, ROWS, Compare
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,13 @@ class StoredFile:
     detail: Callable[[], str] = lambda: ""
 
 
-def compared_columns() -> dict[str, Compare]:
-    """What replay compares, and how: column -> comparison, in the order of the table."""
-    return {name: column.replay for name, column in ROWS.items() if column.replay is not None}
+def compared_columns(further: Iterable[str] = ()) -> dict[str, Compare]:
+    """What replay compares, and how: column -> comparison, in the order of the table.
+
+    further: columns of a row; those of further detectors are compared where they are there.
+    """
+    every = {**ROWS, **{name: FURTHER[name] for name in further if name in FURTHER}}
+    return {name: column.replay for name, column in every.items() if column.replay is not None}
 
 
 def row_differences(
@@ -40,7 +44,7 @@ def row_differences(
         hash alone is compared.
     """
     lines = []
-    for name, how in compared_columns().items():
+    for name, how in compared_columns(recorded).items():
         if stored and name in stored:
             line = _file_difference(how, stored[name], recorded[name], now[name])
         else:

@@ -12,11 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from generator.dataset.format.anchors_table import HeadAnchors
-from generator.dataset.format.columns import EVERY, ROWS
+from generator.dataset.format.columns import EVERY, FURTHER, ROWS
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.defaults import todays_schema, with_defaults
 from generator.dataset.format.digest import digest_of, row_hashes
 from generator.dataset.format.files import file_sha256
+from generator.dataset.format.further import also_of
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest, configuration_digest, parts_configuration
@@ -89,7 +90,9 @@ class PartChecker:
         )
         common = configuration_digest(parts_configuration(manifest))
         self._schemas = {
-            twins: part_schema(manifest.images, {}, common, topology, manifest.schema_version, twins)
+            twins: part_schema(
+                manifest.images, {}, common, topology, manifest.schema_version, twins, also_of(manifest)
+            )
             for twins in (False, True)
         }
         named = ("schema_version", "landmark_topology", "images", "configuration_digest")
@@ -222,7 +225,8 @@ class PartChecker:
         ]
         expected = self._schemas[twins]
         if is_newer(self._manifest.schema_version):  # it may have columns that we do not know
-            schema = pa.schema([field for field in schema if field.name in (EVERY if twins else ROWS)])
+            known = EVERY if twins else {**ROWS, **FURTHER}
+            schema = pa.schema([field for field in schema if field.name in known])
         if not schema.equals(expected):
             names = set(schema.names) ^ set(expected.names) or {
                 field.name for field in expected if not schema.field(field.name).equals(field)

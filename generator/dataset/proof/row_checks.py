@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from generator.dataset.format.columns import LOOKS, ROWS, SCHEMA_VERSION, columns_at
+from generator.dataset.format.columns import FURTHER, LOOKS, ROWS, SCHEMA_VERSION, columns_at
 from generator.dataset.format.files import file_sha256
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.open import as_array
@@ -106,11 +106,20 @@ def look_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:
 
 
 def landmark_problems(batch: pa.RecordBatch, _: RowContext) -> Problems:
-    """Finite where detected, all NaN where not."""
-    landmarks, detected = as_array(batch, "landmarks"), as_array(batch, "detected").astype(bool)
-    finite, missing = np.isfinite(landmarks).all(axis=(1, 2)), np.isnan(landmarks).all(axis=(1, 2))
+    """Finite where detected, all NaN where not; those of further detectors one or the other."""
+    detected = as_array(batch, "detected").astype(bool)
+    finite, missing = _all_or_none(batch, "landmarks")
     yield from named(batch, detected & ~finite, "detected, but a landmark is not finite")
     yield from named(batch, ~detected & ~missing, "not detected, but a landmark is not NaN")
+    for name in (name for name in batch.schema.names if name in FURTHER):
+        finite, missing = _all_or_none(batch, name)
+        yield from named(batch, ~finite & ~missing, f"some of {name} are NaN and some are not")
+
+
+def _all_or_none(batch: pa.RecordBatch, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Rows whose landmarks are all finite, and all NaN. bool [N] each."""
+    landmarks = as_array(batch, name)
+    return np.isfinite(landmarks).all(axis=(1, 2)), np.isnan(landmarks).all(axis=(1, 2))
 
 
 def image_problems(batch: pa.RecordBatch, context: RowContext) -> Problems:

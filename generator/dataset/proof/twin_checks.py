@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from generator.dataset.format.columns import LOOKS, ROWS, columns_at
+from generator.dataset.format.columns import FURTHER, LOOKS, ROWS, columns_at
 from generator.dataset.format.dataset_poses import DatasetPoses
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
@@ -29,7 +29,7 @@ TWINS = "twins"
 
 _OWN = {
     *("sample_id", "image", "image_path", "image_sha256", "passes_path", "passes_sha256"),
-    *("detected", "landmarks"),
+    *("detected", "landmarks", *FURTHER),
 }
 """Columns in which every twin may differ: its name, its files, and what is found on its image."""
 
@@ -113,7 +113,7 @@ def twin_problems(batch: pa.RecordBatch, factor: str, root: Path, manifest: Mani
     for name, base in zip(names, bases, strict=True):
         if name != row_name(base, factor):
             yield f"{name}: twin_of is {base}, of which it is no twin"
-    columns = [name for name in ROWS if name in batch.schema.names]
+    columns = [name for name in (*ROWS, *FURTHER) if name in batch.schema.names]
     heads = set(zip(*(batch.column(name).to_pylist() for name in ("subject", "expression")), strict=True))
     parts = [part for part in manifest.parts if not part.subject or (part.subject, part.expression) in heads]
     where = pc.field("sample_id").isin(bases)

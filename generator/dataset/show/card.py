@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from generator.dataset.format.columns import ROWS, columns_at
+from generator.dataset.format.columns import FURTHER, ROWS, columns_at, further_column
 from generator.dataset.format.files import write_bytes
+from generator.dataset.format.further import also_of
 from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import dataset_topology
@@ -69,8 +70,11 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topolog
         "problems. `poses.csv` lists the poses: of every head, or head by head where each has its own; every "
         "row is one of them."
     )
+    further = (FURTHER[further_column(name)] for name in also_of(manifest))
     columns = column_rows(
-        columns_at(ROWS, manifest.schema_version), topology, lambda column: column.is_in(manifest.images)
+        [*columns_at(ROWS, manifest.schema_version), *further],
+        topology,
+        lambda column: column.is_in(manifest.images),
     )
     sections = [
         _front_matter(manifest, heads),

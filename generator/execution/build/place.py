@@ -93,7 +93,7 @@ def place_orders(source: HeadSource, config: BuildConfig) -> list[PlaceOrder]:
     for head in source.heads:
         subjects[head.subject].append(head)
     return [
-        PlaceOrder(tuple(in_placing_order(heads)), config.poses.frame, config.landmarks)
+        PlaceOrder(tuple(in_placing_order(heads)), config.poses.frame, config.detecting)
         for heads in subjects.values()
     ]
 

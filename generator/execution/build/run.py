@@ -56,6 +56,7 @@ from generator.execution.build.units import plan_units
 from generator.execution.executors.executor import Executor
 from generator.execution.status import LoggingReporter, Reporter
 from generator.heads.head import SkippedHead
+from generator.landmarks.detector import check_detectors
 from generator.messages import BuildOrder, Built, expect
 from generator.picture.settled import settled
 from generator.plan.config import BuildConfig, differences, recorded_config
@@ -114,6 +115,7 @@ def build(
     twin_factors(config)
     config = settled(config)
     check_things(config)
+    check_detectors(config.landmarks)
     claim(root)
     with locked(root) as lock:
         if fresh:
@@ -146,19 +148,21 @@ def _build(
     lock: Lock,
 ) -> BuildResult:
     source = find_source(config, root, reporter, executor.workers)
-    versions = lane_versions(executor, config.landmarks)
+    versions = lane_versions(executor, config.detecting)
     check_schema_of_parts(root)
     planned, skipped = place_heads(source, config, versions, root, executor, reporter)
     lock.check()
     heads = [(head.head.subject, head.head.expression) for head in planned]
     earlier = read_pose_plans(root / POSES_FILE) if (root / POSES_FILE).exists() else None
     poses = chunk_poses(plan_poses(config, heads), config.dataset.unit_size, earlier)
+    recorded = config.moved_to(root)
     orders = plan_units(
         planned,
         poses,
         config,
         root=root,
-        configuration_digest=configuration_digest(common_values(config.as_dict())),
+        # As it is recorded: relative paths count from the dataset there.
+        configuration_digest=configuration_digest(common_values(recorded.as_dict())),
         versions=versions,
     )
     receipts = Receipts(root)
@@ -180,7 +184,6 @@ def _build(
     built, failures, seconds = run_units(todo, executor, receipts, reporter, lock.check)
     parts = sorted(done + built, key=lambda part: part.path)
     write_lines(root / FAILURES_FILE, failures)
-    recorded = config.moved_to(root)
     topology = registries.DETECTORS.get(config.landmarks.detector).topology
     write_heads(
         [head_row(head, relative(head.head.mesh_path, source.path), topology) for head in planned], root

@@ -70,7 +70,9 @@ def _problems(root: Path, file: Path, order: BuildOrder) -> Iterator[str]:
         return
     topology = registries.DETECTORS.get(order.landmarks.detector).topology
     images, twins = cast(ImageMode, order.images), bool(order.factor)
-    expected_schema = part_schema(images, {}, order.configuration_digest, topology, twins=twins)
+    expected_schema = part_schema(
+        images, {}, order.configuration_digest, topology, twins=twins, also=order.landmarks.also
+    )
     if not stored.equals(expected_schema):
         yield "has other columns than a part of this dataset"
         return

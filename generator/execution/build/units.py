@@ -171,7 +171,7 @@ def build_order(
         images=config.dataset.images,
         image_format=config.dataset.image_format,
         passes=config.dataset.passes,
-        landmarks=config.landmarks,
+        landmarks=config.detecting,
         environments=folders.environments,
         pictures=folders.pictures,
         things=folders.things,

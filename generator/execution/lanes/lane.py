@@ -13,6 +13,7 @@ import shutil
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import cast
@@ -22,6 +23,7 @@ import numpy as np
 
 from generator.content import content_versions
 from generator.dataset.format.build_files import PLACED_FILE
+from generator.dataset.format.columns import further_column
 from generator.dataset.format.part import UnitRows, commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
 from generator.dataset.format.schema import ImageMode, part_schema
@@ -37,7 +39,7 @@ from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
 from generator.heads.surroundings import head_alone
-from generator.landmarks.detector import Detector, open_detector
+from generator.landmarks.detector import Detector, each_detector, open_detector
 from generator.landmarks.occlusion import shades, with_occlusion
 from generator.landmarks.shared import SharedAnchors, packaged
 from generator.landmarks.surface import Surface
@@ -120,7 +122,8 @@ class Lane:
         self._close_detectors()
 
     def detector(self, landmarks: Landmarks) -> Detector:
-        """The detector of some settings; made once."""
+        """The first detector of some settings; made once."""
+        landmarks = replace(landmarks, also=())
         if landmarks not in self._detectors:
             self._detectors[landmarks] = open_detector(landmarks)
         return self._detectors[landmarks]
@@ -181,7 +184,8 @@ class Lane:
             self._detectors.popitem()[1].close()
 
     def _versions(self, landmarks: Landmarks) -> dict[str, str]:
-        return content_versions(blender=self.renderer.version, detector=self.detector(landmarks).name)
+        names = [self.detector(one).name for one in each_detector(landmarks).values()]
+        return content_versions(blender=self.renderer.version, detector="; ".join(names))
 
     def _check_memory(self) -> None:
         """WorkerError if lane and render worker outgrew their limit: fresh ones start small again."""
@@ -195,7 +199,7 @@ class Lane:
 
     def _build(self, order: BuildOrder, on_image: OnImage) -> Built:
         seconds: dict[str, float] = {}
-        views, detector = order.views, self.detector(order.landmarks)
+        views, topology = order.views, self.detector(order.landmarks).topology
         with _timed(seconds, "load"):
             package = self._package(order)
         with _timed(seconds, "visibility"):
@@ -206,9 +210,10 @@ class Lane:
                 )
             outfits = self._wardrobe.dress(order.head.name, self._mesh, order.anchors, views, order.things)
             visible = self._surface.visible(order.anchors, views) & ~outfits.hidden(order.anchors, views)
-        topology = detector.topology
-        landmarks = np.full((len(views), topology.count, 3), np.nan, dtype=np.float32)
-        detected = np.zeros(len(views), dtype=bool)
+        detectors = {name: self.detector(one) for name, one in each_detector(order.landmarks).items()}
+        landmarks = {
+            name: np.full((len(views), topology.count, 3), np.nan, dtype=np.float32) for name in detectors
+        }
         suffix, flags = ENCODING[order.image_format]
         images: list[bytes] = []
         folders = Folders(order.environments, order.pictures)
@@ -220,12 +225,13 @@ class Lane:
                 image = self.shots.finish(path, view)
                 images.append(_encoded(image, suffix, flags))
             with _timed(seconds, "detect"):
-                found = detector.detect(image)
-            if found is not None:
-                landmarks[row], detected[row] = found, True
+                for name, one in detectors.items():
+                    if (found := one.detect(image)) is not None:
+                        landmarks[name][row] = found
             on_image()
         for _ in rendered:  # the worker's closing receipt
             pass
+        first = landmarks.pop(order.landmarks.detector)
         passes = None
         if order.passes:
             with _timed(seconds, "passes"):
@@ -240,8 +246,8 @@ class Lane:
             indices=np.array(order.indices, dtype=np.int16).reshape(-1, 3),
             cameras=views.cameras,
             looks=views.looks,
-            detected=detected,
-            landmarks=landmarks,
+            detected=np.isfinite(first).all(axis=(1, 2)),
+            landmarks=first,
             anchors=order.anchors,
             visible=visible,
             left_out=outfits.left_out,
@@ -250,6 +256,7 @@ class Lane:
             passes=passes,
             topology=topology,
             factor=order.factor,
+            extra={further_column(name): points for name, points in landmarks.items()},
         )
         versions = self._versions(order.landmarks)
         with _timed(seconds, "write"):
@@ -259,6 +266,7 @@ class Lane:
                 order.configuration_digest,
                 topology,
                 twins=bool(order.factor),
+                also=order.landmarks.also,
             )
             part = commit_unit(rows, schema, Path(order.root), order.unit)
         return Built(part, seconds, versions)

@@ -85,7 +85,7 @@ def render_preview(
         lane = Lane(LaneOptions(scratch=str(scratch), blender=blender))
         try:
             mesh = lane.read(head)
-            placement = lane.placer(config.landmarks).face(head, mesh)
+            placement = lane.placer(config.detecting).face(head, mesh)
             package = scratch / "preview.npz"
             views = plan_views(config, head.name, placement.radius_mm, [pose])
             placed = placement.normalise(head_alone(mesh, placement))
@@ -93,9 +93,9 @@ def render_preview(
                 placed = with_occlusion(placed)
             save_package(placed, package)
             folders = folders_of(config)
-            outfits = lane.dressed(head, mesh, placement, views, config.landmarks, folders.things)
+            outfits = lane.dressed(head, mesh, placement, views, config.detecting, folders.things)
             [image] = lane.shots.take(package, views, folders, outfits.worn)
-            found = lane.detector(config.landmarks).detect(image)
+            found = lane.detector(config.detecting).detect(image)
         finally:
             lane.close()
     if draw_landmarks and found is not None:

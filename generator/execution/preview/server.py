@@ -144,7 +144,7 @@ class PreviewServer:
         worn = self._outfits(config, head, views).worn
         images = [*self._render(Path(package), views, config, worn)]
         for image in images:
-            detector = self._open_lane().detector(config.landmarks) if landmarks else None
+            detector = self._open_lane().detector(config.detecting) if landmarks else None
             points = detector.detect(image) if detector else None
             found.append(None if points is None else np.round(points[:, :2], 2).tolist())
             tiles.append(image if points is None else draw_points(image, points))
@@ -206,11 +206,11 @@ class PreviewServer:
 
     def _placement(self, config: BuildConfig, subject: str) -> Placement:
         """Where a subject stands, as a build finds it; found once."""
-        key = (subject, config.poses.frame, config.landmarks)
+        key = (subject, config.poses.frame, config.detecting)
         if key not in self._placed:
             assert self._source is not None, "a head that was found has a source"
             heads = [head for head in self._source.heads if head.subject == subject]
-            placer = self._open_lane().placer(config.landmarks)
+            placer = self._open_lane().placer(config.detecting)
             self._placed[key] = placer.stand(in_placing_order(heads), config.poses.frame)
         return self._placed[key]
 
@@ -236,7 +236,7 @@ class PreviewServer:
         head = self._head(*name.split("/"))
         placement, lane = self._placement(config, head.subject), self._open_lane()
         things = folders_of(config).things
-        return lane.dressed(head, lane.read(head), placement, views, config.landmarks, things)
+        return lane.dressed(head, lane.read(head), placement, views, config.detecting, things)
 
     def _render(
         self, package: Path, views: Views, config: BuildConfig, worn: tuple[tuple[Worn, ...], ...] = ()

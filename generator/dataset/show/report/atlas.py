@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from generator.dataset.format.columns import further_column
+from generator.dataset.format.further import also_of, first_of, seen_by
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
 from generator.dataset.format.open import as_array, read_rows
@@ -31,11 +33,17 @@ _COLUMNS = [
 class Atlas:
     """Sums over cells of pose, for all heads together (place 0) and for some heads of their own."""
 
-    def __init__(self, heads: Sequence[HeadRow], cells: PoseCells, topology: Topology = FACE_MESH) -> None:
+    def __init__(
+        self,
+        heads: Sequence[HeadRow],
+        cells: PoseCells,
+        topology: Topology = FACE_MESH,
+        numbers: int = NUMBERS,
+    ) -> None:
         self.cells, self.topology = cells, topology
         regions, points = len(topology.regions), topology.count
         layers = 3 + 5 * regions + 7
-        room = max(1, NUMBERS // (layers * len(cells)))
+        room = max(1, numbers // (layers * len(cells)))
         picked = np.unique(np.linspace(0, len(heads) - 1, min(room, len(heads))).round().astype(int))
         self.heads = [heads[i] for i in picked]
         self._slot = {(head.subject, head.expression): k for k, head in enumerate(self.heads, start=1)}
@@ -95,13 +103,20 @@ class Atlas:
         face = exact @ as_array(batch, "rotation")[rows].reshape(-1, 3, 3)
         self._face += np.where(there[..., None], face, 0.0).sum(axis=0)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for the page; numbers rounded to three decimals, null where there are none."""
+    def frame(self) -> dict[str, Any]:
+        """What the maps are over."""
         return {
             "axes": {name: axis.tolist() for name, axis in zip(ANGLES, self.cells.axes, strict=True)},
             "binned": self.cells.binned,
             "regions": list(self.topology.regions),
             "picks": ["all heads", *(f"{head.subject} / {head.expression}" for head in self.heads)],
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """The maps, for the page; numbers rounded to three decimals, null where there are none."""
+        return {
+            "detected": int(self.detected[0].sum()),
+            "overall": self.overall,
             "maps": [self._map(slot) for slot in range(len(self.heads) + 1)],
             "points": self._points(),
         }
@@ -162,20 +177,28 @@ class Atlas:
         }
 
 
-def collect_atlas(
+def collect_atlases(
     root: Path,
     manifest: Manifest,
     heads: Sequence[HeadRow],
     cells: PoseCells,
     progress: Callable[[int], None],
     topology: Topology = FACE_MESH,
-) -> Atlas:
-    """Read all rows once. Raises DatasetError: a part is missing or damaged."""
-    atlas = Atlas(heads, cells, topology)
-    for batch in read_rows(root, manifest.parts, _COLUMNS):
-        atlas.add(batch)
+) -> dict[str, Atlas]:
+    """One a detector, by its name, the first one first. Reads all rows once.
+
+    Raises DatasetError: a part is missing or damaged.
+    """
+    also = also_of(manifest)
+    numbers = NUMBERS // (1 + len(also))
+    first = Atlas(heads, cells, topology, numbers)
+    further = {name: Atlas(heads, cells, topology, numbers) for name in also}
+    for batch in read_rows(root, manifest.parts, [*_COLUMNS, *map(further_column, also)]):
+        first.add(batch)
+        for name, atlas in further.items():
+            atlas.add(seen_by(batch, name))
         progress(len(batch))
-    return atlas
+    return {first_of(manifest): first, **further}
 
 
 def _over(total: np.ndarray, count: np.ndarray) -> np.ndarray:

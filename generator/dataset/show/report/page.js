@@ -60,7 +60,8 @@
 
   // ---- sums over cells -------------------------------------------------
   const { yaw, pitch, roll } = data.axes;
-  const state = { pick: 0, roll: 0, measure: "distance", region: 0 };
+  const state = { detector: 0, pick: 0, roll: 0, measure: "distance", region: 0 };
+  const seen = () => data.detectors[state.detector];
   const cell = (i, j, k) => (i * pitch.length + j) * roll.length + k;
   const rollsShown = () => (state.roll === 0 ? roll.map((_, k) => k) : [state.roll - 1]);
   const cellsAt = (i, j) => rollsShown().map((k) => cell(i, j, k));
@@ -80,8 +81,8 @@
     const centre = means.reduce((s, m) => s + mean(m, weights, cells) ** 2, 0);
     return Math.sqrt(Math.max(0, square - centre));
   }
-  const part = () => data.maps[state.pick].regions[state.region];
-  const map = () => data.maps[state.pick];
+  const part = () => seen().maps[state.pick].regions[state.region];
+  const map = () => seen().maps[state.pick];
   const AXES = ["yaw", "pitch", "roll"];
   const MEASURES = {
     distance: { name: "distance, px", unit: "\u00a0px", of: (c) => mean(part().distance, part().rows, c) },
@@ -203,9 +204,27 @@
     if (data.why_no_atlas) return;
     drawAtlas();
     drawRegions();
+    drawFace();
   }
 
+  function setUpDetectors() {
+    const several = data.detectors.length > 1;
+    $("detector-label").hidden = $("detectors-card").hidden = !several;
+    if (!several) return;
+    data.detectors.forEach((one, k) => $("detector").append(make("option", { value: k, text: one.name })));
+    $("detector").addEventListener("change", (e) => { state.detector = Number(e.target.value); redraw(); });
+    const titles = ["detector", "faces found", "landmarks off by", "on the face", "pose off by"];
+    const number = (value, unit, digits = 2) => make("td", { class: "number", "data-value": value ?? "",
+      text: value === null ? "–" : value.toFixed(digits) + unit });
+    $("detectors").replaceChildren(
+      make("tr", {}, ...titles.map((text, k) => make("th", { scope: "col", class: k ? "number" : "", text }))),
+      ...data.detectors.map((one) => make("tr", {}, make("th", { scope: "row", text: one.name }),
+        number(data.rows ? 100 * one.detected / data.rows : 0, "\u00a0%", 1),
+        number(one.overall.distance_px, "\u00a0px"), number(one.overall.distance_mm, "\u00a0mm"),
+        number(one.overall.geodesic_deg, "°"))));
+  }
   function setUpMaps() {
+    setUpDetectors();
     data.picks.forEach((name, k) => $("pick").append(make("option", { value: k, text: name })));
     Object.entries(MEASURES).forEach(([key, m]) => $("measure").append(make("option", { value: key, text: m.name })));
     data.regions.forEach((name, k) => $("region").append(make("option", { value: k, text: name })));
@@ -230,8 +249,8 @@
   }
 
   // ---- face ------------------------------------------------------------
-  function setUpFace() {
-    const p = data.points;
+  function drawFace() {
+    const p = seen().points;
     const there = p.x.map((x, k) => (x === null ? -1 : k)).filter((k) => k >= 0);
     const xs = there.map((k) => p.x[k]), ys = there.map((k) => p.y[k]);
     const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -252,11 +271,14 @@
       });
       dots.append(dot);
     }
-    svg.append(lines, dots);
+    svg.replaceChildren(lines, dots);
     $("shift-scale").textContent = String(times);
-    $("show-shift").addEventListener("change", (e) => { lines.style.display = e.target.checked ? "" : "none"; });
+    $("face-readout").textContent = "";
+    const shown = () => { lines.style.display = $("show-shift").checked ? "" : "none"; };
+    $("show-shift").onchange = shown;
+    shown();
     legend($("face-legend"), ERROR, "0", `${high.toFixed(1)} px and more`);
-    $("face-note").textContent = `Mean distance of each landmark over the ${images(data.overall.compared)} in which ` +
+    $("face-note").textContent = `Mean distance of each landmark over the ${images(seen().overall.compared)} in which ` +
       "a face was found. The pose is undone, so a line is what the detector gets wrong in the same way however the " +
       "head turns. Image left is the subject's right.";
   }
@@ -460,7 +482,7 @@
     rows($("timings"), Object.entries(build.timings).sort((a, b) => b[1] - a[1]).map(([k, v]) => [k, v.toFixed(1) + " s"]));
   }
   function setUpTop() {
-    const o = data.overall;
+    const [first] = data.detectors, o = first.overall;
     $("title").textContent = `${images(data.rows)} of ${whole(data.heads_count)} ${data.heads_count === 1 ? "head" : "heads"}`;
     $("lead").textContent = "Rendered at poses that are known exactly. Where a detector found the face, its landmarks are " +
       "compared with the same points on the mesh: what remains is the detector's own error.";
@@ -469,7 +491,7 @@
     const figures = [
       figure("Images", whole(data.rows), `${whole(data.poses)} poses a head`),
       figure("Heads", whole(data.heads_count), `${whole(data.publishable)} may be published`),
-      figure("Faces found", percent(data.rows ? data.detected / data.rows : 0), `${whole(data.rows - data.detected)} missed`),
+      figure("Faces found", percent(data.rows ? first.detected / data.rows : 0), `${whole(data.rows - first.detected)} missed`),
     ];
     if (o.compared) {
       figures.push(figure("Landmarks off by", `${o.distance_px.toFixed(2)} px`, `${o.distance_mm.toFixed(2)} mm on the face`),
@@ -481,7 +503,6 @@
   setUpTop();
   setUpSheet();
   setUpMaps();
-  if (!data.why_no_atlas) setUpFace();
   setUpVariety();
   setUpTwins();
   setUpHeads();

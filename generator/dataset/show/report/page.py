@@ -13,7 +13,7 @@ from generator.dataset.format.files import write_anywhere
 from generator.dataset.format.heads_table import read_heads
 from generator.dataset.format.manifest import read_manifest
 from generator.dataset.format.open import dataset_topology
-from generator.dataset.show.report.atlas import collect_atlas
+from generator.dataset.show.report.atlas import collect_atlases
 from generator.dataset.show.report.cells import PoseCells
 from generator.dataset.show.report.facts import build_facts, head_facts, why_no_atlas
 from generator.dataset.show.report.tiles import contact_sheet, thumbnails
@@ -43,17 +43,17 @@ def report_data(root: Path, progress: Callable[[int], None]) -> dict[str, Any]:
     poses = read_dataset_poses(root, heads)
     cells = PoseCells.of(poses)
     topology = dataset_topology(root, manifest)
-    atlas = collect_atlas(root, manifest, heads, cells, progress, topology)
+    atlases = collect_atlases(root, manifest, heads, cells, progress, topology)
+    atlas = next(iter(atlases.values()))
     return {
         "rows": manifest.rows,
-        "detected": manifest.detected_rows,
         "heads_count": manifest.heads,
         "publishable": sum(head.redistributable for head in heads),
         "poses": poses.most,
         "images": manifest.images,
-        "overall": atlas.overall,
         "why_no_atlas": why_no_atlas(heads, atlas),
-        **atlas.as_dict(),
+        **atlas.frame(),
+        "detectors": [{"name": name, **one.as_dict()} for name, one in atlases.items()],
         "variety": collect_variety(root, manifest, heads),
         "twins": collect_twins(root, manifest),
         "sheet": contact_sheet(root, manifest, heads, poses, topology),
