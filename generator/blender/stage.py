@@ -135,7 +135,7 @@ class Stage:
                 self._worn[package] = self._make("worn", mesh)
                 for thing in self._worn[package]:
                     self.scene.collection.objects.link(thing)
-                self._worn[package][0].matrix_world = AWAY
+                self._take_off(package)
 
     @property
     def objects(self) -> list[bpy.types.Object]:
@@ -156,15 +156,24 @@ class Stage:
                     set_gloss(material, look.gloss)
 
     def _put_on(self, packages: Sequence[str]) -> None:
-        """Have these things in the scene, and no others: each costs an image time, seen or not."""
+        """Have the head wear these things, and no others."""
         for package in [*self._on]:
             if package not in packages:
                 self._on.remove(package)
-                self._worn[package][0].matrix_world = AWAY
+                self._take_off(package)
         for package in packages:
             if package not in self._on:
                 self._on.append(package)
+                if self._fast is None:
+                    set_seen(self._worn[package][0], True)
                 self._lit = None
+
+    def _take_off(self, package: str) -> None:
+        """Away with it, where no ray of the camera comes near, and no other meets it. It stays in the scene:
+        taken out of it, it would be prepared anew the next time."""
+        self._worn[package][0].matrix_world = AWAY
+        if self._fast is None:
+            set_seen(self._worn[package][0], False)
 
     def _make(self, name: str, mesh: HeadMesh) -> list[bpy.types.Object]:
         """An object and, for the fast preset, its twin; not in the scene yet."""

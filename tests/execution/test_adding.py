@@ -202,7 +202,8 @@ def test_a_setting_touches_the_table_and_the_place_that_uses_it(
     before, mark, after = table.read_text().partition("    ambient: float = setting(")
     table.write_text(before + EXPOSURE + mark + after)
     use = tmp_path / "generator" / "blender" / "stage.py"
-    before, mark, after = use.read_text().partition("            self._light.set(*lit)\n")
+    place = "            self._set_light(view.look, environment, pixel_mm)\n"
+    before, mark, after = use.read_text().partition(place)
     assert mark
     use.write_text(
         before + mark + "            self.scene.view_settings.exposure = view.look.exposure\n" + after
