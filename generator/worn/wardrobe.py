@@ -119,6 +119,8 @@ class Wardrobe:
             return Outfits()
         known = self._fit
         if known is None or self._name != name or known.mesh is not mesh or known.things != things:
+            if known is not None:
+                known.known.clear()  # it knows what knows it, and nobody would free it for long
             shutil.rmtree(self._folder)
             self._folder.mkdir()
             on_mesh = points @ CAMERA_FROM_GRAPHICS
