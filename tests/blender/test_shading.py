@@ -23,6 +23,7 @@ from generator.picture.develop import to_linear
 from generator.picture.scenery import Folders
 from generator.plan.settings import Look
 from generator.plan.views import View, Views
+from generator.plan.wear import Worn
 
 CAMERA = Camera.square(96, 85.0, 700.0)
 FACING, LAMP_WIDTH = 0.028, 0.012
@@ -306,6 +307,23 @@ def test_a_look_is_the_same_whatever_looks_its_maps_lie_beside(shots: Shots, fol
     for k in (0, 7, 15, 16, 18):
         np.testing.assert_array_equal(taken(shots, package, looks[k])[0], together[k])
     assert len({image.tobytes() for image in together}) == len(looks)
+
+
+def test_what_is_put_on_later_shines_as_if_it_had_been_at_hand(shots: Shots, folder: Path) -> None:
+    look = Look(gloss=0.5, lamp1_strength=0.5, lamp1_yaw_deg=30.0)
+    package = ball(folder, scale=0.9)
+    thing = ball(folder, scale=1.02, name="frame", label="glasses", gloss=0.33)
+    views, worn = Views.of([View((0.0, 0.0, 0.0), CAMERA, look)]), ((Worn(str(thing), (0.0, 0.0, 0.0)),),)
+
+    def dressed() -> np.ndarray:
+        [image] = shots.take(package, views, Folders(), worn)
+        return image
+
+    [bare] = taken(shots, package, look)
+    later = dressed()
+    taken(shots, ball(folder, 0.7), look)  # another head: everything is made anew
+    np.testing.assert_array_equal(later, dressed())
+    assert np.abs(later.astype(int) - bare).max() > 20
 
 
 def test_a_head_that_nobody_cast_rays_for_is_open(shots: Shots, folder: Path) -> None:
