@@ -21,9 +21,9 @@ from generator.plan.settings import Look
 SHEETS = 16
 """In an image, at most: of the looks that are shown next."""
 
-STEP = 1 / 512
-"""Of a texel, in what is looked up: so many digits are left over that the place of a sheet is added exactly,
-and a look is the same wherever its sheet lies."""
+STEP, ROWS = 1 / 512, 1 << 14
+"""Of a texel, in what is looked up, and the most rows of an image: no more digits than a float32 has, so
+that the place of a sheet is added exactly and a look is the same wherever its sheet lies."""
 
 CLEAR = 0.7
 """Of a gloss above that the highlights are narrower than four texels of a coarse map."""
@@ -74,7 +74,8 @@ class MapNodes:
         wanted = look, environment
         if wanted not in self._sheets:
             there = self._ahead.index(wanted) if wanted in self._ahead else len(self._ahead)
-            self._draw(dict.fromkeys([wanted, *self._ahead[there + 1 : there + SHEETS]]))
+            count = min(SHEETS, max(1, ROWS // self._layout.height))
+            self._draw(dict.fromkeys([wanted, *self._ahead[there + 1 : there + count]]))
         return self._sheets[wanted]
 
     def _draw(self, looks: Mapping[Lit, None]) -> None:
