@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-INSTALL = "pip install 'headturn[pose]', on Python 3.10 to 3.12, or 'headturn[litert]'"
-"""What helps where MediaPipe, or OpenCV, which comes with both, is missing."""
-
 
 class HpeError(Exception):
     """The base of all errors that end in one clear line instead of a traceback."""

@@ -27,6 +27,7 @@ from downstream_hpe.manifold.decomposition import PAPER_RANKS, Ranks, decompose
 from downstream_hpe.manifold.plot import plot_manifolds
 from downstream_hpe.manifold.tensor_model import TENSOR_FILE, TensorModel
 from downstream_hpe.networks.confidence import Confidence, calibrate, level_faces
+from downstream_hpe.networks.truncation import untruncated
 from downstream_hpe.prediction.plausibility import FaceShapes
 from downstream_hpe.prediction.predictor import MODEL_FILE
 from downstream_hpe.tables.missing import Missing
@@ -34,6 +35,7 @@ from downstream_hpe.tables.pose_zero import common_zero
 from downstream_hpe.tables.rows import Rows, read_rows
 from downstream_hpe.tables.splits import split_subjects, subjects_by_split
 from downstream_hpe.tables.tensor import Axes, open_tensor
+from downstream_hpe.writing import writing
 
 if TYPE_CHECKING:
     from downstream_hpe.networks.training import Progress
@@ -41,6 +43,9 @@ if TYPE_CHECKING:
 
 CARD_FILE = "model.json"
 PLOT_FILE = "manifolds.png"
+PARTIAL_EVERY = 3
+"""One partial face of so many is learned from: exact ones are soon learned, and more of them make the network
+take a detector's profiles for exact, too."""
 LITTLE = 0.5
 """Of the error of the answer (0, 0, 0): who is off by more has learned too little."""
 
@@ -49,15 +54,17 @@ LITTLE = 0.5
 class FitSettings:
     """recipe: "continuous" or "paper". extra: further datasets, at any poses, that only the networks
     learn from. calibrate: datasets that the confidence is calibrated on instead of the subjects held out;
-    whoever was trained on is left out. validation: share of subjects held out where no dataset has a
-    validation split of its own; 0: none, and then there is no confidence either, unless calibrate says
-    what it is to come from."""
+    whoever was trained on is left out, and one that is named twice counts twice. partial: whether the
+    networks learn from rows on which no face was found, too, from the exact landmarks that the camera sees.
+    validation: share of subjects held out where no dataset has a validation split of its own; 0: none, and
+    then there is no confidence either, unless calibrate says what it is to come from."""
 
     recipe: str = "continuous"
     extra: tuple[str, ...] = ()
     calibrate: tuple[str, ...] = ()
     ranks: Ranks = PAPER_RANKS
     missing: Missing = "fail"
+    partial: bool = False
     normalisation: Normalisation = "rms"
     refinements: int = 2
     validation: float = 0.1
@@ -102,14 +109,29 @@ def fit(
     recipe = recipe_named(settings.recipe, settings.epochs, settings.seed)
     if settings.extra and not recipe.continuous:
         raise UsageError("the paper's recipe learns from a grid alone; leave out --extra or its recipe")
+    if settings.partial and not recipe.continuous:
+        raise UsageError(
+            "the paper's recipe learns from whole faces alone; leave out --partial or its recipe"
+        )
     every = [dataset, *map(Path, settings.extra)]
     zero = common_zero([*every, *map(Path, settings.calibrate)])
     trained, held_out = _subjects(every, settings)
-    rows = Rows.joined([read_rows(path) for path in every])
-    mine, theirs = (rows.take(np.isin(rows.subjects, sorted(some))) for some in (trained, held_out))
-    judges = _judges(settings.calibrate, trained) if settings.calibrate else theirs
-    model, card = _tensor_model(dataset, trained, mean_face(mine), settings, folder, note)
-    note(f"{len(mine)} faces of {len(trained)} subjects; held out: {len(theirs)} of {len(held_out)}")
+    datasets = [read_rows(path, partial=settings.partial) for path in every]
+    rows = Rows.joined(datasets)
+    face = mean_face(_of(rows, trained))
+    usable = Rows.joined(untruncated(datasets, face)) if recipe.continuous else rows
+    mine, theirs = _fewer_partial(_of(usable, trained)), _of(rows, held_out)
+    # What a detector makes of a face is to be judged.
+    theirs = theirs.take(theirs.complete)
+    judges = _judges(settings.calibrate, trained, face) if settings.calibrate else _of(usable, held_out)
+    judges = judges.take(judges.complete)
+    model, card = _tensor_model(dataset, trained, face, settings, folder, note)
+    if len(usable) < len(rows):
+        note(
+            f"{len(rows) - len(usable)} faces left out: near the end of their dataset, where another goes on"
+        )
+    parts = f" ({(~mine.complete).sum()} of them partial)" if settings.partial else ""
+    note(f"{len(mine)} faces{parts} of {len(trained)} subjects; held out: {len(theirs)} of {len(held_out)}")
 
     torch.set_num_threads(settings.threads)
     network = train(mine, model, recipe, folder, progress)
@@ -118,8 +140,9 @@ def fit(
     if len(judges):
         weights = replace(weights, confidence=_confidence(weights, mine, judges))
         note(f"confidence calibrated on {len(judges)} faces of {len(set(judges.subjects))} subjects")
-    weights.save(folder / NETWORK_FILE)
-    export_onnx(weights, folder / MODEL_FILE)
+    with writing(folder):
+        weights.save(folder / NETWORK_FILE)
+        export_onnx(weights, folder / MODEL_FILE)
     card |= {
         "settings": asdict(settings),
         "recipe": asdict(recipe),
@@ -135,8 +158,17 @@ def fit(
         card["held_out"] = [summary(e) for e in evaluations]
     for line in unlearnt(evaluations):
         note(line)
-    (folder / CARD_FILE).write_text(json.dumps(card, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    with writing(folder):
+        (folder / CARD_FILE).write_text(json.dumps(card, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     return Fitted(card, evaluations)
+
+
+def _fewer_partial(rows: Rows) -> Rows:
+    return rows.take(rows.complete | (np.arange(len(rows)) % PARTIAL_EVERY == 0))
+
+
+def _of(rows: Rows, subjects: set[str]) -> Rows:
+    return rows.take(np.isin(rows.subjects, sorted(subjects)))
 
 
 def _tensor_model(
@@ -156,7 +188,8 @@ def _tensor_model(
         expression=settings.expression,
         demands=partial(demands_of, settings.ranks),
     )
-    folder.mkdir(parents=True, exist_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     note(f"tensor {' x '.join(map(str, tensor.shape))}; {tensor.report.text()}")
 
     def round_done(number: int, error: float) -> None:
@@ -218,9 +251,9 @@ def unlearnt(evaluations: Sequence[Evaluation]) -> list[str]:
     ]
 
 
-def _judges(datasets: Sequence[str], trained: set[str]) -> Rows:
+def _judges(datasets: Sequence[str], trained: set[str], face: np.ndarray) -> Rows:
     """The rows of subjects that were not trained on. DataError: there are none."""
-    rows = Rows.joined([read_rows(path) for path in datasets])
+    rows = Rows.joined(untruncated([read_rows(path) for path in datasets], face))
     judges = rows.take(~np.isin(rows.subjects, sorted(trained)))
     if not len(judges):
         raise DataError(f"{', '.join(datasets)}: every subject is trained on; calibrate on others")

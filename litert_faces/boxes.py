@@ -9,7 +9,7 @@ import numpy as np
 
 from litert_faces.crop import Square
 from litert_faces.errors import FinderError
-from litert_faces.network import Network
+from litert_faces.network import PictureNetwork
 
 VALUES = 16
 """A box: centre, size, six points of the face; two numbers each, in pixels of the network's picture."""
@@ -43,7 +43,7 @@ class Boxes:
 class BoxDetector:
     """A network of MediaPipe's that finds faces. FinderError: it has not the outputs of one."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: PictureNetwork) -> None:
         self._network = network
         count = network.sizes[-1]
         if count not in STRIDES or network.sizes != (VALUES * count, count):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from litert_faces.errors import FinderError, PictureError
+from litert_faces.installing import install_with_these
 
 LONGEST = (1 << 15) - 2
 """OpenCV's warpPerspective takes no more."""
@@ -53,7 +54,7 @@ class Square:
         try:
             import cv2
         except ImportError as error:
-            raise FinderError("OpenCV is not installed: pip install 'headturn[litert]'") from error
+            raise FinderError(f"OpenCV is not installed: {install_with_these('litert')}") from error
         corners = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], dtype=np.float32)
         # As MediaPipe has it: corners of the square on corners of the first and last pixels but half a pixel.
         turn = cv2.getPerspectiveTransform(self.pixels(corners).astype(np.float32), size * corners)

@@ -7,7 +7,7 @@ import hashlib
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,11 +19,13 @@ MAX_BYTES = 32 << 20
 
 @dataclass(frozen=True)
 class Layout:
-    """Paths of three networks in a place: boxes near, points of a face, boxes far; "" where there is none."""
+    """Paths of networks in a place: boxes near, points of a face, boxes far, blendshapes; "" where there is
+    none."""
 
     near: str
     points: str
     far: str = ""
+    blendshapes: str = ""
 
     @property
     def package(self) -> str:
@@ -35,8 +37,8 @@ class Layout:
         return folder.parent if folder.name == self.package else folder
 
 
-TASK = Layout("face_detector.tflite", "face_landmarks_detector.tflite")
-"""A .task of Face Landmarker: 478 points."""
+TASK = Layout("face_detector.tflite", "face_landmarks_detector.tflite", blendshapes="face_blendshapes.tflite")
+"""A .task of Face Landmarker: 478 points, and no detector of boxes far."""
 MEDIAPIPE = Layout(
     "mediapipe/modules/face_detection/face_detection_short_range.tflite",
     "mediapipe/modules/face_landmark/face_landmark.tflite",
@@ -66,12 +68,13 @@ INSTALL = {
 
 @dataclass(frozen=True)
 class Networks:
-    """Content of three .tflite files. where: for messages. far: None where there is none."""
+    """Content of .tflite files. where: for messages. far, blendshapes: None where there is none."""
 
     where: str
     near: bytes
     points: bytes
     far: bytes | None
+    blendshapes: bytes | None = None
 
     @property
     def digest(self) -> str:
@@ -102,6 +105,8 @@ def package_folders(name: str) -> list[Path]:
 def given(place: Path) -> Networks:
     """Those of a .task, of a wheel, of a folder that one was unpacked into, or of a package's own folder.
 
+    A place without a detector of boxes far has that of an installed package, if there is one.
+
     FinderError: it cannot be read, or has not what any of LAYOUTS says.
     """
     if place.is_dir():
@@ -124,7 +129,8 @@ Read = Callable[[str], bytes | None]
 def _found(place: Path, reader: Callable[[Layout], Read]) -> Networks:
     for layout in LAYOUTS:
         if reader(layout)(layout.points) is not None:
-            return _read(str(place), reader(layout), layout)
+            found = _read(str(place), reader(layout), layout)
+            return found if found.far is not None else replace(found, far=_installed_far())
     raise FinderError(f"{place}: has no {TASK.points}, nor Face Mesh where mediapipe's wheel has it")
 
 
@@ -132,7 +138,18 @@ def _read(where: str, read: Read, layout: Layout) -> Networks:
     near, points = read(layout.near), read(layout.points)
     if near is None or points is None:
         raise FinderError(f"{where}: has no {layout.near}")
-    return Networks(where, near, points, read(layout.far) if layout.far else None)
+    far, blendshapes = (read(name) if name else None for name in (layout.far, layout.blendshapes))
+    return Networks(where, near, points, far, blendshapes)
+
+
+def _installed_far() -> bytes | None:
+    """What several packages have is one network, in files that differ by what else they say."""
+    for name, layout in INSTALLED.items():
+        for folder in package_folders(name):
+            far = _of_folder(layout.root(folder))(layout.far)
+            if far is not None:
+                return far
+    return None
 
 
 def _of_folder(folder: Path) -> Read:

@@ -14,10 +14,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from downstream_hpe.errors import HpeError
 from downstream_hpe.escape import printable
+from litert_faces.installing import numpy_clash
 
 EXTRAS = {
     **dict.fromkeys(("torch", "onnx", "safetensors"), "hpe"),
-    **dict.fromkeys(("onnxruntime", "mediapipe", "cv2"), "pose"),
+    **dict.fromkeys(("pyarrow", "matplotlib"), "tables"),
+    **dict.fromkeys(("onnxruntime", "mediapipe", "cv2", "av"), "pose"),
 }
 """The extra that brings a module along."""
 
@@ -60,13 +62,18 @@ def one_line_errors() -> Iterator[None]:
         note(f"downstream-hpe: {error}", style="red")
         sys.exit(error.exit_code)
     except ImportError as error:
+        if (line := numpy_clash(error)) is not None:
+            note(f"downstream-hpe: {line}", style="red")
+            sys.exit(1)
         # What comes with an extra is missing, or a library of the system that it needs.
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
+        from downstream_hpe.release import install
+
         missing = isinstance(error, ModuleNotFoundError)
         what = f"{name} is not installed" if missing else f"{name} cannot be imported ({error})"
-        note(f"downstream-hpe: {what}: pip install 'headturn[{EXTRAS[name]}]'")
+        note(f"downstream-hpe: {what}: {install(EXTRAS[name])}")
         sys.exit(1)
     except UnicodeEncodeError as error:
         name = repr(error.object if len(error.object) < 300 else f"{error.object[:300]}...")

@@ -12,6 +12,7 @@ import typer
 
 from downstream_hpe.cli.console import JsonFlag, note
 from downstream_hpe.errors import UsageError
+from downstream_hpe.writing import writing
 
 
 class LayoutName(str, Enum):
@@ -46,15 +47,22 @@ def evaluate(
     bounded: Annotated[
         bool, typer.Option("--bounded/--all", help="Only poses in the paper's bounds: 50, 40, 30.")
     ] = True,
+    partial: Annotated[
+        bool,
+        typer.Option(
+            "--partial", help="Score the rows without a face, by the exact landmarks that the camera sees."
+        ),
+    ] = False,
     protocol: Annotated[
         ProtocolName | None,
         typer.Option(help="Which labels count, by the papers' names."),
     ] = None,
     folds: Annotated[
-        int, typer.Option(min=2, max=1000, help="Folds of subjects, to take a constant rotation out.")
+        int,
+        typer.Option(min=2, max=1000, help="Folds of subjects for the errors without a constant rotation."),
     ] = 5,
     detector: Annotated[
-        str | None, typer.Option(help="Who finds faces in photographs, as predict has it.")
+        str | None, typer.Option(help="Detector of faces in photographs, as for predict.")
     ] = None,
     report: Annotated[Path | None, typer.Option("--out", help="Folder for tables and plots.")] = None,
     as_json: JsonFlag = False,
@@ -76,11 +84,13 @@ def evaluate(
         check_protocol(protocol.value, layout.value)
     if detector is not None and layout is LayoutName.headturn:
         raise UsageError("--detector looks at photographs; the rows of a dataset have their landmarks")
+    if partial and layout is not LayoutName.headturn:
+        raise UsageError("--partial needs exact landmarks, which photographs have none of; leave it out")
     predictor = Predictor.load(model, detector=detector)
     face = None if reference is None else load_reference(reference)
     every = model_estimators(model, predictor, face)
     if layout is LayoutName.headturn:
-        measured = scored_rows.dataset_rows(predictor, dataset, split, note)
+        measured = scored_rows.dataset_rows(predictor, dataset, split, note, partial)
     else:
         measured = scored_rows.photograph_rows(predictor, dataset, layout.value, note)
         predictor.close()
@@ -104,11 +114,12 @@ def evaluate(
     if report is not None:
         from downstream_hpe.evaluation.plots import write_plots
 
-        report.mkdir(parents=True, exist_ok=True)
-        (report / "errors.md").write_text("\n".join(tables), encoding="utf-8")
-        scores.write_csv(found, report / "errors.csv")
-        misses.write_csv(missed, report / "misses.csv")
-        write_plots(found, report)
+        with writing(report):
+            report.mkdir(parents=True, exist_ok=True)
+            (report / "errors.md").write_text("\n".join(tables), encoding="utf-8")
+            scores.write_csv(found, report / "errors.csv")
+            misses.write_csv(missed, report / "misses.csv")
+            write_plots(found, report)
         note(f"tables and plots: {report}")
     if as_json:
         counts = {"undetected": undetected, "damaged": measured.damaged}

@@ -66,6 +66,13 @@ def fit(
             help="A dataset to calibrate the confidence on, instead of the subjects held out; repeatable."
         ),
     ] = None,
+    partial: Annotated[
+        bool,
+        typer.Option(
+            "--partial",
+            help="Learn from rows without a face, too: from the exact landmarks that the camera sees.",
+        ),
+    ] = False,
     recipe: Annotated[
         RecipeName, typer.Option(help="continuous: this program's. paper: the paper's.")
     ] = RecipeName.continuous,
@@ -95,6 +102,7 @@ def fit(
         recipe=recipe.value,
         extra=tuple(map(str, extra or ())),
         calibrate=tuple(map(str, calibrate or ())),
+        partial=partial,
         ranks=_ranks(ranks),
         missing=_missing(missing, holes).value,
         normalisation=normalisation.value,

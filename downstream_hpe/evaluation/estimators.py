@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from downstream_hpe.evaluation.scores import Evaluation, evaluate
+from downstream_hpe.geometry.mean_head import mean_head
+from downstream_hpe.geometry.partial import completed
 from downstream_hpe.geometry.rotation import angles_from_rotation, fit_rotation
 from downstream_hpe.manifold.tensor_model import TENSOR_FILE, TensorModel
 from downstream_hpe.prediction.predictor import Predictor, model_folder
 from downstream_hpe.tables.rows import Rows
 
 Estimator = Callable[[np.ndarray], np.ndarray]
-"""Landmarks float [N, 468, 3] -> (yaw, pitch, roll) in degrees, float [N, 3]."""
+"""Landmarks float [N, 468, 3], NaN where not seen -> (yaw, pitch, roll) in degrees, float [N, 3]."""
 
 
 def constant_zero(landmarks: np.ndarray) -> np.ndarray:
@@ -44,9 +46,13 @@ def estimators(folder: Path, reference: np.ndarray | None = None) -> dict[str, E
     return {
         "constant zero": constant_zero,
         f"rigid fit to {of}": rigid_fit(face),
-        "reconstruction": lambda landmarks: reconstruction.from_landmarks(landmarks).ypr_deg,
+        "reconstruction": lambda landmarks: reconstruction.from_landmarks(_whole(landmarks)).ypr_deg,
         "encoder + heads": lambda landmarks: predictor.from_landmarks(landmarks).ypr_deg,
     }
+
+
+def _whole(landmarks: np.ndarray) -> np.ndarray:
+    return completed(landmarks, mean_head()) if np.isnan(landmarks).any() else landmarks
 
 
 def reference_face(model: str, given: np.ndarray | None) -> np.ndarray | None:

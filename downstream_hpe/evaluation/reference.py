@@ -19,8 +19,10 @@ def mean_face(rows: Rows) -> np.ndarray:
     """The mean face of a training set, levelled: every row is turned back by its R_C.
 
     All poses count, since a detector's depth leans most at the front: the mean of near-frontal faces
-    alone makes a worse reference. Every head counts the same. float64 [468, 3], frame C, RMS 1.
+    alone makes a worse reference. Every head counts the same; partial faces do not. float64 [468, 3], frame
+    C, RMS 1.
     """
+    rows = rows.take(rows.complete)
     level = normalise(rows.landmarks.astype(np.float64)) @ rows.rotation  # rows x^T R = (R^T x)^T
     heads = [level[rows.heads == head].mean(axis=0) for head in np.unique(rows.heads)]
     return normalise(np.mean(heads, axis=0))

@@ -11,7 +11,8 @@ import numpy as np
 
 from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.evaluation.photographs import FORMATS, LeftOut, detected_rows
-from downstream_hpe.prediction.inputs import MEDIA
+from downstream_hpe.geometry.partial import LEAST_POINTS
+from downstream_hpe.prediction.kinds import MEDIA
 from downstream_hpe.prediction.predictor import Predictor
 from downstream_hpe.tables.pose_zero import MANIFEST, pose_zero
 from downstream_hpe.tables.rows import Rows, read_exact, read_missed, read_rows
@@ -31,16 +32,26 @@ class Measured:
     own_points: np.ndarray | None = None
 
 
-def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, note: Note) -> Measured:
+def dataset_rows(
+    predictor: Predictor, dataset: Path | str, split: str | None, note: Note, partial: bool = False
+) -> Measured:
     """The rows of a dataset whose subjects the model was not trained on.
+
+    partial: instead those on which no face was found, as :func:`read_rows` makes partial faces of them.
 
     Raises
     ------
     UsageError: pictures instead of tables. DataError: no such rows.
     """
     _expect_tables(Path(dataset))
-    rows = read_rows(dataset, split)
+    rows = read_rows(dataset, split, partial)
     subjects, missed_deg = read_missed(dataset, split)
+    if partial:
+        if rows.undetected:
+            note(f"{rows.undetected} rows left out: the camera sees fewer than {LEAST_POINTS} landmarks")
+        rows, subjects, missed_deg = rows.take(~rows.complete), subjects[:0], missed_deg[:0]
+        if not len(rows):
+            raise DataError(f"{dataset}: a face was found in every row; leave out --partial")
     theirs = pose_zero(dataset)
     if theirs and predictor.pose_zero and theirs != predictor.pose_zero:
         note(
@@ -53,7 +64,7 @@ def dataset_rows(predictor: Predictor, dataset: Path | str, split: str | None, n
         raise DataError(f"{dataset}: the model was trained on every subject in it; give other heads")
     if not unseen.all():
         note(f"{len(np.unique(rows.subjects[~unseen]))} subjects the model was trained on left out")
-    own = read_exact(dataset, split)
+    own = None if partial else read_exact(dataset, split)
     return Measured(
         rows.take(unseen),
         missed_deg[~np.isin(subjects, trained)],

@@ -10,6 +10,7 @@ estimate that knows nothing of K reads, since a crop around the face looks the s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,10 +34,15 @@ class Camera:
         """Focal length, pixels; of two, along x and y, their geometric mean."""
         return float(np.sqrt(self.matrix[0, 0] * self.matrix[1, 1]))
 
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """K^-1, float64 [3, 3]."""
+        return np.linalg.inv(self.matrix)
+
     def rays(self, pixels: np.ndarray) -> np.ndarray:
         """Directions of pixels, z = 1, frame C: float [..., 2] -> float64 [..., 3]."""
         ones = np.ones((*pixels.shape[:-1], 1))
-        return np.concatenate([pixels, ones], axis=-1) @ np.linalg.inv(self.matrix).T
+        return np.concatenate([pixels, ones], axis=-1) @ self.inverse.T
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
         """Where points before the camera are seen: float [..., 3], frame C -> float64 [..., 2]."""

@@ -23,7 +23,8 @@ def normalise(landmarks: np.ndarray, how: Normalisation = "rms") -> np.ndarray:
 
     Parameters
     ----------
-    landmarks: float [..., 468, 3], any unit; NaN stays NaN.
+    landmarks: float [..., 468, 3], any unit. NaN stays NaN; of a face with such points c and the mean are of
+    the others.
 
     Returns
     -------
@@ -36,8 +37,8 @@ def normalise(landmarks: np.ndarray, how: Normalisation = "rms") -> np.ndarray:
     if landmarks.shape[-2:] != (POINTS, 3):
         raise ValueError(f"expected landmarks of shape [..., {POINTS}, 3], got {landmarks.shape}")
     if how == "rms":
-        centred = landmarks - landmarks.mean(axis=-2, keepdims=True)
-        scale = np.sqrt((centred**2).sum(axis=-1, keepdims=True).mean(axis=-2, keepdims=True))
+        centred = landmarks - _mean_of_seen(landmarks)
+        scale = np.sqrt(_mean_of_seen((centred**2).sum(axis=-1, keepdims=True)))
     elif how == "eyes":
         centred = landmarks - landmarks[..., NOSE_TIP : NOSE_TIP + 1, :]
         eyes = landmarks[..., RIGHT_EYE, :] - landmarks[..., LEFT_EYE, :]
@@ -47,3 +48,15 @@ def normalise(landmarks: np.ndarray, how: Normalisation = "rms") -> np.ndarray:
     if (scale == 0).any():
         raise ValueError("cannot normalise landmarks that all coincide")
     return centred / scale
+
+
+def _mean_of_seen(values: np.ndarray) -> np.ndarray:
+    """Over the points, float [..., P, K] -> [..., 1, K]; NaN where there is none."""
+    seen = ~np.isnan(values)
+    if seen.all():
+        return np.asarray(values.mean(axis=-2, keepdims=True))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            np.where(seen, values, 0).sum(axis=-2, keepdims=True)
+            / seen.sum(axis=-2, keepdims=True).astype(values.dtype)
+        )

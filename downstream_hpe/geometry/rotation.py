@@ -45,13 +45,16 @@ def fit_rotation(source: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    source: float [P, 3]; targets: float [N, P, 3], row i corresponds to row i.
+    source: float [P, 3]; targets: float [N, P, 3], row i corresponds to row i; NaN where there is no point.
 
     Returns
     -------
     float64 [N, 3, 3], proper rotations.
     """
     a = source - source.mean(axis=0)
+    if np.isnan(targets).any():
+        # With targets about the centre of those that there are, it does not matter where the source's is.
+        targets = np.nan_to_num(targets - np.nanmean(targets, axis=1, keepdims=True))
     b = targets - targets.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("npi,pj->nij", b, a))
     sign = np.ones((len(b), 3))

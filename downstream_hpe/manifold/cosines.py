@@ -133,9 +133,8 @@ def _fit_column(column: np.ndarray, angles: np.ndarray, betas: np.ndarray) -> np
     if np.ptp(column) <= 1e-12 * np.abs(column).max(initial=1e-300):
         return np.array([0.0, 1.0, 0.0, column.mean()])
     tried = np.append(betas, _fourier_beta(column, angles))
-    left = np.linalg.svd(_basis(angles, tried), full_matrices=False)
-    # At Nyquist a basis can lose a column; its direction must not count.
-    explained = np.where(left[1] > 1e-10 * left[1][:, :1], np.einsum("bdk,d->bk", left[0], column), 0.0)
+    left = np.linalg.svd(_basis(angles, tried), full_matrices=False)[0]
+    explained = np.einsum("bdk,d->bk", left, column)
     best = float(tried[np.argmax((explained**2).sum(axis=1))])
     step = betas[-1] / betas[-2]
 

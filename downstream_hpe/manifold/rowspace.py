@@ -40,10 +40,11 @@ class RowSpace:
 
     def finish(self, rank: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """U [N, rank], all singular values in memory (descending), V^T [rank, M]."""
+        if self._scaled is None and not self._rows:
+            raise ValueError("a matrix without rows has no decomposition")
         values = self._merge(rank)
         singular = np.sqrt(values)
-        if self._scaled is None:
-            raise ValueError("a matrix without rows has no decomposition")
+        assert self._scaled is not None  # _merge made it
         safe = np.where(singular > 0, singular, 1.0)[:rank, None]
         return self._left, singular, self._scaled / safe
 

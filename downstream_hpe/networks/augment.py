@@ -58,9 +58,9 @@ def shapes_of(
 
     Returns
     -------
-    float32 [H, 468, 3]; heads without such a pose are left out.
+    float32 [H, 468, 3]; heads without such a pose are left out, and partial faces.
     """
-    near = np.abs(ypr_deg).max(axis=1) <= near_deg
+    near = (np.abs(ypr_deg).max(axis=1) <= near_deg) & ~np.isnan(level).any(axis=(1, 2))
     _, index = np.unique(heads[near], return_inverse=True)
     count = np.bincount(index)
     total = np.zeros((len(count), *level.shape[1:]), dtype=np.float64)
@@ -79,7 +79,7 @@ def disturbed(
 
     Parameters
     ----------
-    level: float32 [B, 468, 3], normalised and level. rotation: R_C, float64 [B, 3, 3].
+    level: float32 [B, 468, 3], normalised and level, NaN where not seen. rotation: R_C, float64 [B, 3, 3].
     shapes: float32 [H, 468, 3], of :func:`shapes_of`.
 
     Returns

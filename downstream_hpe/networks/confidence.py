@@ -4,7 +4,7 @@
 The squared error to be expected is a sum of parts, none negative. Landmarks turned back by the estimate
 should be a level face: how far they are from it is put into three numbers, and where the estimate lies into
 two an angle. Their weights are fitted to faces that were not trained on; each has a floor, so that whatever
-was never seen, a pose beyond the range or no face at all, makes the estimate less sure.
+was never seen, a pose beyond the range, no face at all or half of one, makes the estimate less sure.
 
 Two angles that are off by normal errors of mean square V in all are off by less than t with the probability
 1 - exp(-t^2 / V), Rayleigh's distribution; of three, the one that is found best, roll, counts little.
@@ -23,6 +23,7 @@ from downstream_hpe.errors import ModelError
 from downstream_hpe.geometry.face_mesh import FEATURES, POINTS
 from downstream_hpe.geometry.metrics import SURE_DEG, geodesic_errors
 from downstream_hpe.geometry.normalise import Normalisation, normalise
+from downstream_hpe.geometry.partial import among, seen_points
 
 COMPONENTS = 24
 """Directions in which level faces differ, the pose's own distortions among them."""
@@ -32,12 +33,14 @@ QUANTITIES = (
     *("strange outside", "strange shape", "strange turn"),
     *("yaw", "pitch", "roll"),
     *("beyond yaw", "beyond pitch", "beyond roll"),
+    "unseen",
 )
-UNITS = np.array([25.0] * 9 + [400.0] * 3)
+UNITS = np.array([25.0] * 9 + [400.0] * 3 + [100.0])
 """What weights are measured in, square degrees: an error of SURE_DEG for a face like those trained on and at
-the range's edge, and of BEYOND_DEG so far beyond it."""
-FLOORS = np.array([0.04, 0.04, 0.04, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * UNITS
-"""Least weights: what is strange is off, and beyond the range by as much as it is beyond."""
+the range's edge, of BEYOND_DEG so far beyond it, and of 10 of a face of which next to nothing is seen."""
+FLOORS = np.array([0.04, 0.04, 0.04, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]) * UNITS
+"""Least weights: what is strange is off, beyond the range by as much as it is beyond, and a partial face, of
+which those that it is calibrated on have none, by as much as is not seen."""
 STRANGE = 2.5
 """Residuals above so many times those of the training faces are of no face, or of another's pose."""
 LEAST = 1.0
@@ -58,7 +61,7 @@ class Confidence:
     mean float64 [1404]: the mean level face. basis float64 [1404, 3 + K]: orthonormal; turns of that
     face about the three axes, then components of shape. scale float64 [3 + K + 1]: what the squares
     of the coefficients, and of what the basis leaves, are divided by. range_deg float64 [3, 2].
-    weights float64 [12] of QUANTITIES and bias: square degrees.
+    weights float64 [13] of QUANTITIES and bias: square degrees.
     """
 
     mean: np.ndarray
@@ -71,15 +74,23 @@ class Confidence:
     def of(self, features: np.ndarray, ypr_deg: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """Probability that the geodesic error is below SURE_DEG, float64 [N].
 
-        features: float [N, 1404], normalised landmarks. ypr_deg [N, 3], rotation [N, 3, 3]: the estimate.
+        features: float [N, 1404], normalised landmarks, NaN where not seen. ypr_deg [N, 3], rotation
+        [N, 3, 3]: the estimate.
         """
         return _below(self.bias + self.quantities(features, ypr_deg, rotation) @ self.weights)
 
     def quantities(self, features: np.ndarray, ypr_deg: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """float64 [N, 12], none negative; about 1 for a face like those trained on, at the range's edge, or
-        BEYOND_DEG beyond it."""
-        level = np.asarray(features, dtype=np.float64).reshape(-1, POINTS, 3) @ rotation
-        residual = level.reshape(len(level), -1) - self.mean
+        """float64 [N, 13], none negative; about 1 for a face like those trained on, at the range's edge,
+        BEYOND_DEG beyond it, or without a point."""
+        landmarks, mean = (
+            np.asarray(features, dtype=np.float64).reshape(-1, POINTS, 3),
+            self.mean.reshape(-1, 3),
+        )
+        seen = seen_points(landmarks).astype(np.float64)
+        centre, spread = among(mean, seen)
+        share = seen.mean(axis=1, keepdims=True)
+        placed = np.nan_to_num(landmarks) @ rotation * spread[:, None] + centre[:, None]
+        residual = ((placed - mean) * seen[..., None]).reshape(len(seen), -1) / np.sqrt(share)
         parts = np.square(residual @ self.basis)
         rest = np.maximum(np.square(residual).sum(axis=1) - parts.sum(axis=1), 0) / self.scale[-1]
         scaled = parts / self.scale[:-1]
@@ -90,13 +101,16 @@ class Confidence:
         inside = np.minimum(place, half) / half
         sizes = np.sqrt(np.column_stack([rest, shape, turn]))
         strange = np.maximum(sizes - STRANGE, 0)
-        return np.concatenate([sizes, np.square(np.hstack([strange, inside, beyond]))], axis=1)
+        squared = np.square(np.hstack([strange, inside, beyond]))
+        return np.concatenate([sizes, squared, 1 - share], axis=1)
 
 
 def level_faces(
     landmarks: np.ndarray, rotation: np.ndarray, normalisation: Normalisation
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean, basis and scale of :class:`Confidence`, from training faces and their true R_C."""
+    """Mean, basis and scale of :class:`Confidence`, from complete training faces and their true R_C."""
+    whole = seen_points(landmarks).all(axis=1)
+    landmarks, rotation = landmarks[whole], rotation[whole]
     chosen = slice(None, None, -(-len(landmarks) // _SAMPLE))
     level = normalise(landmarks[chosen].astype(np.float64), normalisation) @ rotation[chosen]
     mean = level.mean(axis=0)

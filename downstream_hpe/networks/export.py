@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import logging
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper
 from scipy.linalg import block_diag
 from torch import nn
 
@@ -19,65 +19,31 @@ from downstream_hpe.geometry.metrics import SURE_DEG
 from downstream_hpe.geometry.normalise import Normalisation
 from downstream_hpe.model_file import packed
 from downstream_hpe.networks.confidence import BEYOND_DEG, STRANGE, TURNS, Confidence
+from downstream_hpe.networks.graph import Graph
 from downstream_hpe.networks.pose_network import REACH, PoseNetwork
 from downstream_hpe.networks.rigid_fit import ENTRIES, LEAST, SHIFT, SQUARINGS, RigidFit
 from downstream_hpe.networks.weights import Weights
 from downstream_hpe.prediction.onnx_file import FORMAT, IR_VERSION, OPSET
 
 
-class _Graph:
-    """Nodes and constants, added one by one."""
-
-    def __init__(self) -> None:
-        self.nodes: list[onnx.NodeProto] = []
-        self.constants: list[onnx.TensorProto] = []
-
-    def constant(self, value: np.ndarray) -> str:
-        name = f"c{len(self.constants)}"
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
-        return name
-
-    def add(self, operation: str, *inputs: str, output: str | None = None, **attributes: Any) -> str:
-        name = output or f"n{len(self.nodes)}"
-        self.nodes.append(helper.make_node(operation, list(inputs), [name], **attributes))
-        return name
-
-    def array(self, value: np.ndarray) -> str:
-        """A constant, float32."""
-        return self.constant(np.asarray(value, dtype=np.float32))
-
-    def number(self, value: float) -> str:
-        return self.array(np.array(value))
-
-    def linear(self, value: str, weight: np.ndarray, bias: np.ndarray, output: str | None = None) -> str:
-        """x W^T + b, weight [out, in]."""
-        return self.add("Gemm", value, self.array(weight.T), self.array(bias), output=output)
-
-    def multilayer(self, layers: nn.Module, value: str) -> str:
-        for layer in layers.children():
-            if isinstance(layer, nn.Linear):
-                value = self.linear(value, layer.weight.detach().numpy(), layer.bias.detach().numpy())
-            else:
-                value = self.add({nn.ReLU: "Relu", nn.Tanh: "Tanh"}[type(layer)], value)
-        return value
-
-
 def export_onnx(weights: Weights, path: Path) -> None:
     """Write the graph: landmarks float32 [N, 468, 3], any unit -> ypr_deg [N, 3], rotation [N, 3, 3]
     and, where it was calibrated, confidence [N].
 
-    Its metadata, JSON under "downstream-hpe", hold the format, the normalisation, the angles trained
-    on and the subjects trained on.
+    Where the network starts from a rigid fit it takes partial faces, too: a point that is not seen is NaN.
+    Its metadata, JSON under "downstream-hpe", say so ("partial"), and hold the format, the normalisation,
+    the angles trained on and the subjects trained on.
     """
     network, normalisation = weights.network, weights.normalisation
-    graph = _Graph()
-    scaled = _normalised(graph, normalisation)
-    features = graph.add("Reshape", scaled, graph.constant(np.array([-1, FEATURES])))
-    _heads(graph, network, _factors(graph, network, scaled, features))
+    graph = Graph()
+    seen = None if network.rigid is None else _seen(graph)
+    scaled = _normalised(graph, normalisation, seen)
+    features = graph.shaped(scaled, -1, FEATURES)
+    _heads(graph, network, _factors(graph, network, scaled, features, seen))
     _rotation(graph)
     outputs: list[tuple[str, list[str | int]]] = [("ypr_deg", ["N", 3]), ("rotation", ["N", 3, 3])]
     if weights.confidence is not None:
-        _confidence(graph, weights.confidence, scaled)
+        _confidence(graph, weights.confidence, scaled, seen)
         outputs.append(("confidence", ["N"]))
     model = helper.make_model(
         helper.make_graph(
@@ -96,6 +62,7 @@ def export_onnx(weights: Weights, path: Path) -> None:
         "range_deg": weights.range_deg.tolist(),
         "trained_subjects": list(weights.trained_subjects),
         "pose_zero": weights.pose_zero,
+        "partial": network.rigid is not None and normalisation == "rms",
     }
     helper.set_model_props(model, packed(FORMAT, facts))
     onnx.checker.check_model(model, full_check=True)
@@ -125,52 +92,96 @@ def _no_preprocessing_note(record: logging.LogRecord) -> bool:
     return "pre-processing" not in record.getMessage()
 
 
-def _normalised(graph: _Graph, normalisation: Normalisation) -> str:
-    """:func:`downstream_hpe.geometry.normalise.normalise`: [N, 468, 3]."""
-    if normalisation == "rms":
-        centre = graph.add("ReduceMean", "landmarks", axes=[1], keepdims=1)
-    else:
-        centre = graph.add("Gather", "landmarks", graph.constant(np.array([NOSE_TIP])), axis=1)
-    centred = graph.add("Sub", "landmarks", centre)
-    if normalisation == "rms":
+@dataclass(frozen=True)
+class _Seen:
+    """points [N, 468, 3], 0 where not seen. each [N, 468, 1] and flat [N, 468]: 1 where seen, or 0. count and
+    share of those [N, 1]."""
+
+    points: str
+    each: str
+    flat: str
+    count: str
+    share: str
+
+
+def _seen(graph: Graph) -> _Seen:
+    whole = graph.add("ReduceSum", "landmarks", graph.constant(np.array([2])), keepdims=1)
+    unknown = graph.add("IsNaN", whole)
+    points = graph.add("Where", unknown, graph.number(0.0), "landmarks")
+    each = graph.add("Cast", graph.add("Not", unknown), to=TensorProto.FLOAT)
+    flat = graph.shaped(each, -1, POINTS)
+    count = graph.add("ReduceSum", flat, graph.constant(np.array([1])), keepdims=1)
+    return _Seen(points, each, flat, count, graph.add("Mul", count, graph.number(1 / POINTS)))
+
+
+def _normalised(graph: Graph, normalisation: Normalisation, seen: _Seen | None) -> str:
+    """:func:`downstream_hpe.geometry.normalise.normalise`: [N, 468, 3]; 0 where a point is not seen."""
+    points = "landmarks" if seen is None else seen.points
+    if normalisation == "eyes":
+        centred = graph.add("Sub", points, graph.point(points, NOSE_TIP))
+        eyes = graph.add("Sub", graph.point(points, RIGHT_EYE), graph.point(points, LEFT_EYE))
+        scale = graph.add("ReduceL2", eyes, axes=[2], keepdims=1)
+    elif seen is None:
+        centred = graph.add("Sub", points, graph.add("ReduceMean", points, axes=[1], keepdims=1))
         squares = graph.add("ReduceSumSquare", centred, axes=[1, 2], keepdims=1)
         scale = graph.add("Sqrt", graph.add("Mul", squares, graph.number(1 / POINTS)))
     else:
-        ends = (
-            graph.add("Gather", "landmarks", graph.constant(np.array([i])), axis=1)
-            for i in (RIGHT_EYE, LEFT_EYE)
-        )
-        scale = graph.add("ReduceL2", graph.add("Sub", *ends), axes=[2], keepdims=1)
+        count = graph.shaped(seen.count, -1, 1, 1)
+        sums = graph.add("ReduceSum", points, graph.constant(np.array([1])), keepdims=1)
+        centred = graph.add("Sub", points, graph.add("Div", sums, count))
+        centred = graph.add("Mul", centred, seen.each)
+        squares = graph.add("ReduceSumSquare", centred, axes=[1, 2], keepdims=1)
+        scale = graph.add("Sqrt", graph.add("Div", squares, count))
     return graph.add("Div", centred, scale)
 
 
-def _factors(graph: _Graph, network: PoseNetwork, scaled: str, features: str) -> str:
+def _residual(graph: Graph, level: str, mean: np.ndarray, seen: _Seen | None) -> str:
+    """Level faces [N, 468, 3] less a mean face [468, 3], moved to where that has the points that are seen; 0
+    where they are not: :func:`downstream_hpe.geometry.partial.among`. [N, 1404]."""
+    if seen is None:
+        return graph.shaped(graph.add("Sub", level, graph.array(mean)), -1, FEATURES)
+    centred = mean - mean.mean(axis=0)
+    squares = np.square(centred).sum(axis=1, keepdims=True)
+    scale = squares.mean()
+    sums = graph.add("MatMul", seen.flat, graph.array(np.hstack([centred, squares / scale])))
+    means = graph.add("Div", sums, seen.count)
+    centre = graph.add("Gather", means, graph.constant(np.arange(3)), axis=1)
+    of_squares = graph.add("Gather", means, graph.constant(np.array([3])), axis=1)
+    off = graph.add("ReduceSumSquare", centre, axes=[1], keepdims=1)
+    spread = graph.add("Sqrt", graph.add("Sub", of_squares, graph.add("Mul", off, graph.number(1 / scale))))
+    scaled = graph.add("Mul", level, graph.shaped(spread, -1, 1, 1))
+    placed = graph.add("Add", scaled, graph.shaped(centre, -1, 1, 3))
+    residual = graph.add("Mul", graph.add("Sub", placed, graph.array(mean)), seen.each)
+    return graph.shaped(residual, -1, FEATURES)
+
+
+def _factors(graph: Graph, network: PoseNetwork, scaled: str, features: str, seen: _Seen | None) -> str:
     """:meth:`downstream_hpe.networks.pose_network.PoseNetwork.factors`."""
     if network.rigid is None:
         return graph.multilayer(network.encoder, features)
-    start, shape = _rigid_fit(graph, network.rigid, scaled, features)
-    moved = graph.multilayer(network.encoder, graph.add("Concat", start, shape, axis=1))
+    assert seen is not None
+    start, shape = _rigid_fit(graph, network.rigid, scaled, features, seen)
+    unseen = graph.add("Sub", graph.number(1.0), seen.share)
+    moved = graph.multilayer(network.encoder, graph.add("Concat", start, shape, unseen, axis=1))
     return graph.add("Add", start, graph.add("Mul", graph.add("Tanh", moved), graph.number(REACH)))
 
 
-def _rigid_fit(graph: _Graph, rigid: RigidFit, scaled: str, features: str) -> tuple[str, str]:
+def _rigid_fit(graph: Graph, rigid: RigidFit, scaled: str, features: str, seen: _Seen) -> tuple[str, str]:
     """:class:`downstream_hpe.networks.rigid_fit.RigidFit`: factor vectors [N, 9], coordinates [N, K]."""
     flat = graph.add("MatMul", features, graph.array(rigid.matrix()))
     size = graph.add("ReduceL2", flat, axes=[1], keepdims=1)
     unit = graph.add("Div", flat, graph.add("Add", size, graph.number(LEAST)))
     shifted = graph.add("Add", unit, graph.array(SHIFT * np.eye(4).reshape(1, 16)))
-    powers = graph.add("Reshape", shifted, graph.constant(np.array([-1, 4, 4])))
+    powers = graph.shaped(shifted, -1, 4, 4)
     for _ in range(SQUARINGS):
         powers = graph.add("MatMul", powers, powers)
-    flat = graph.add("Reshape", powers, graph.constant(np.array([-1, 16])))
+    flat = graph.shaped(powers, -1, 16)
     trace = graph.add("MatMul", flat, graph.array(np.eye(4).reshape(16, 1)))
     entries = graph.add("MatMul", graph.add("Div", flat, trace), graph.array(ENTRIES.T))
-    rotation = graph.add("Reshape", entries, graph.constant(np.array([-1, 3, 3])))
-    level = graph.add(
-        "Reshape", graph.add("MatMul", scaled, rotation), graph.constant(np.array([-1, FEATURES]))
-    )
-    mean, basis = (value.double().numpy() for value in (rigid.mean, rigid.basis))
-    shape = graph.linear(level, basis.T, -mean @ basis)
+    rotation = graph.shaped(entries, -1, 3, 3)
+    mean, basis = rigid.mean.double().numpy().reshape(POINTS, 3), rigid.basis.double().numpy()
+    residual = _residual(graph, graph.add("MatMul", scaled, rotation), mean, seen)
+    shape = graph.add("Div", graph.add("MatMul", residual, graph.array(basis)), seen.share)
     alpha, beta, gamma, phi = rigid.curves.double().numpy().T
     turns = np.repeat(np.eye(3), len(beta) // 3, axis=0) * beta[:, None]
     cosines = graph.add("Cos", graph.linear(_angles(graph, entries), turns, gamma))
@@ -178,7 +189,7 @@ def _rigid_fit(graph: _Graph, rigid: RigidFit, scaled: str, features: str) -> tu
     return start, shape
 
 
-def _angles(graph: _Graph, entries: str) -> str:
+def _angles(graph: Graph, entries: str) -> str:
     """Yaw, pitch and roll in radians of the entries of R_C, [N, 9] -> [N, 3].
 
     atan2(y, x) = 2 atan(y / (r + x)), of yaw with x = cos yaw and r = 1; of the others r = cos yaw.
@@ -201,7 +212,7 @@ def _angles(graph: _Graph, entries: str) -> str:
     return graph.add("Mul", graph.add("Atan", ratio), graph.number(2.0))
 
 
-def _heads(graph: _Graph, network: PoseNetwork, factors: str) -> None:
+def _heads(graph: Graph, network: PoseNetwork, factors: str) -> None:
     """The three heads side by side, each layer one matrix with three blocks; and the output ypr_deg.
 
     The zeros between the blocks cost less than the three times as many operations without them.
@@ -232,7 +243,7 @@ _TERMS = (
 """(entry, sign, factors)."""
 
 
-def _rotation(graph: _Graph) -> None:
+def _rotation(graph: Graph) -> None:
     """R_C from the output ypr_deg."""
     # A fourth angle, always 0, whose cosine is the 1.
     radians = graph.add("MatMul", "ypr_deg", graph.array(np.eye(3, 4) * (np.pi / 180)))
@@ -249,11 +260,12 @@ def _rotation(graph: _Graph) -> None:
     graph.add("Reshape", flat, graph.constant(np.array([-1, 3, 3])), output="rotation")
 
 
-def _confidence(graph: _Graph, confidence: Confidence, scaled: str) -> None:
+def _confidence(graph: Graph, confidence: Confidence, scaled: str, seen: _Seen | None) -> None:
     """:meth:`downstream_hpe.networks.confidence.Confidence.of` the outputs ypr_deg and rotation."""
-    level = graph.add("MatMul", scaled, "rotation")
-    flat = graph.add("Reshape", level, graph.constant(np.array([-1, FEATURES])))
-    residual = graph.add("Sub", flat, graph.array(confidence.mean))
+    mean = confidence.mean.reshape(POINTS, 3)
+    residual = _residual(graph, graph.add("MatMul", scaled, "rotation"), mean, seen)
+    if seen is not None:
+        residual = graph.add("Div", residual, graph.add("Sqrt", seen.share))
     # With columns divided by their scale, sums of squares are all that is left.
     turns, rest = slice(0, TURNS), slice(TURNS, None)
     found = graph.add("MatMul", residual, graph.array(confidence.basis))
@@ -274,9 +286,11 @@ def _confidence(graph: _Graph, confidence: Confidence, scaled: str) -> None:
     # The angles' units are degrees here; the weights take them as Confidence.quantities has them.
     parts = graph.add("Concat", strange, inside, beyond, axis=1)
     squared = graph.add("Mul", parts, parts)
-    quantities = graph.add("Concat", sizes, squared, axis=1)
+    unseen = [] if seen is None else [graph.add("Sub", graph.number(1.0), seen.share)]
+    quantities = graph.add("Concat", sizes, squared, *unseen, axis=1)
     units = np.concatenate([np.ones(6), half**2, np.full(3, BEYOND_DEG**2)])
-    expected = graph.linear(quantities, (confidence.weights / units)[None], np.array([confidence.bias]))
+    weights = np.concatenate([confidence.weights[:-1] / units, confidence.weights[-1:][: len(unseen)]])
+    expected = graph.linear(quantities, weights[None], np.array([confidence.bias]))
     beyond_it = graph.add("Exp", graph.add("Div", graph.number(-(SURE_DEG**2)), expected))
     chance = graph.add("Sub", graph.number(1.0), beyond_it)
     graph.add("Reshape", chance, graph.constant(np.array([-1])), output="confidence")

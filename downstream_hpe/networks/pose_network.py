@@ -35,8 +35,8 @@ class PoseNetwork(nn.Module):
     one unit of a head's output is, in degrees, a float an angle.
 
     rigid: with it the encoder does not see the landmarks but what their rigid fit makes of them, factor
-    vectors and K coordinates of shape, and what it gives is added to those factor vectors, by REACH at most.
-    It is then (9 + K)-...-9.
+    vectors, K coordinates of shape and the share that is not seen, and what it gives is added to those factor
+    vectors, by REACH at most. It is then (9 + K + 1)-...-9, and landmarks may be NaN.
     """
 
     scale_deg: torch.Tensor

@@ -18,7 +18,7 @@ class Recipe:
     the rigid fit's factor vectors; 0: it sees the landmarks.
     least_steps: of an epoch, which goes over few rows more than once for them."""
 
-    layers: tuple[int, ...] = (FACTORS + 5, 64, 32, 9)
+    layers: tuple[int, ...] = (FACTORS + 5 + 1, 64, 32, 9)
     head_layers: tuple[int, ...] = (3, 64, 64, 1)
     epochs: int = 20
     batch: int = 256

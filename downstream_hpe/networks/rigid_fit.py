@@ -9,6 +9,8 @@ The rotation R that turns a level face a_p best onto the landmarks b_p maximises
 quaternions q^T N q (Horn, J. Opt. Soc. Am. A 4(4), 1987): the largest eigenvector of a 4 x 4 matrix. Its
 powers tend to q q^T, and every entry of R is linear in that; so the fit is a few products of small matrices,
 which a graph of tensors can hold.
+
+Points that are not seen are NaN, and are in none of it.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import torch
 from torch import nn
 
 from downstream_hpe.geometry.face_mesh import FEATURES, POINTS
+from downstream_hpe.geometry.partial import among
 from downstream_hpe.manifold.cosines import Manifolds
 
 FACTORS = 9
@@ -51,7 +54,8 @@ RIGID_PARTS = ("mean", "basis", "curves")
 
 
 class RigidFit(nn.Module):
-    """From normalised landmarks to the factor vectors of their rigid fit, and coordinates of their shape.
+    """From normalised landmarks to the factor vectors of their rigid fit, coordinates of their shape, and the
+    share of the points that is not seen.
 
     mean [1404]: the level face that is fitted. basis [1404, K]: coordinates are (level - mean) basis.
     curves [9, 4]: alpha, beta, gamma, phi of the cosines of yaw, pitch and roll.
@@ -73,13 +77,14 @@ class RigidFit(nn.Module):
         """level: float [N, 468, 3], normalised training faces, each turned back by its own R_C.
 
         The basis: directions in which faces differ most once they are turned back by their rigid fit, each
-        divided by its standard deviation, a little more.
+        divided by its standard deviation, a little more. Partial faces are left out.
         """
+        level = level[~np.isnan(level).any(axis=(1, 2))]
         faces = torch.from_numpy(level.reshape(len(level), FEATURES).astype(np.float64))
         mean = faces.mean(dim=0).numpy()
         curves = np.concatenate(manifolds.params)
         blank = RigidFit(mean, np.zeros((FEATURES, 0)), curves)
-        residual = blank.level(faces).numpy() - mean
+        residual = blank.residual(faces, torch.ones(len(faces), POINTS)).numpy()
         residual -= residual.mean(axis=0)
         variance, directions = np.linalg.eigh(residual.T @ residual / len(residual))
         kept = np.argsort(variance)[::-1][:components]
@@ -89,7 +94,7 @@ class RigidFit(nn.Module):
     @property
     def sees(self) -> int:
         """How many numbers it gives."""
-        return FACTORS + int(self.basis.shape[1])
+        return FACTORS + int(self.basis.shape[1]) + 1
 
     def matrix(self) -> np.ndarray:
         """Normalised landmarks [1404] -> N of the mean face, float64 [1404, 16]."""
@@ -98,7 +103,7 @@ class RigidFit(nn.Module):
         return np.einsum("pj,ijm->pim", face, ENTRIES.reshape(3, 3, 16)).reshape(FEATURES, 16)
 
     def rotation(self, features: torch.Tensor) -> torch.Tensor:
-        """R_C of the rigid fit: normalised landmarks [N, 1404] -> [N, 3, 3]."""
+        """R_C of the rigid fit: normalised landmarks [N, 1404], 0 where not seen -> [N, 3, 3]."""
         flat = features @ torch.tensor(self.matrix(), dtype=features.dtype)
         powers = flat.reshape(-1, 4, 4) / (flat.norm(dim=1)[:, None, None] + LEAST)
         powers = powers + SHIFT * torch.eye(4, dtype=features.dtype)
@@ -107,17 +112,29 @@ class RigidFit(nn.Module):
         powers = powers.reshape(-1, 16) / powers.diagonal(dim1=1, dim2=2).sum(dim=1, keepdim=True)
         return (powers @ torch.tensor(ENTRIES.T, dtype=features.dtype)).reshape(-1, 3, 3)
 
-    def level(self, features: torch.Tensor) -> torch.Tensor:
-        """Landmarks turned back by their rigid fit: [N, 1404] -> [N, 1404]."""
-        return (features.reshape(-1, POINTS, 3) @ self.rotation(features)).reshape(-1, FEATURES)
+    def residual(self, points: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+        """Landmarks turned back by their rigid fit, less the mean face; 0 where not seen: float [N, 1404].
+
+        points: normalised, 0 where not seen. seen: [N, 468], 1 or 0.
+        """
+        mean = self.mean.to(points.dtype).reshape(POINTS, 3)
+        centre, spread = among(mean, seen.to(points.dtype))
+        level = points.reshape(-1, POINTS, 3) @ self.rotation(points)
+        placed = level * spread[:, None] + centre[:, None]
+        return ((placed - mean) * seen[..., None]).reshape(-1, FEATURES)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Normalised landmarks [N, 1404] -> factor vectors [N, 9], coordinates of shape [N, K]."""
-        rotation = self.rotation(features)
-        level = (features.reshape(-1, POINTS, 3) @ rotation).reshape(-1, FEATURES)
+        """Normalised landmarks [N, 1404], NaN where not seen -> factor vectors [N, 9]; K coordinates of
+        shape and the share not seen [N, K + 1]."""
+        known = ~features.isnan()
+        points = torch.where(known, features, 0.0)
+        seen = known.reshape(-1, POINTS, 3).all(dim=2).to(features.dtype)
+        share = seen.mean(dim=1, keepdim=True)
         alpha, beta, gamma, phi = self.curves.T
-        angles = torch.repeat_interleave(_angles(rotation), FACTORS // 3, dim=1)
-        return alpha * torch.cos(beta * angles + gamma) + phi, (level - self.mean) @ self.basis
+        angles = torch.repeat_interleave(_angles(self.rotation(points)), FACTORS // 3, dim=1)
+        # What is not seen is taken for as far from the mean as what is.
+        shape = self.residual(points, seen) @ self.basis / share
+        return alpha * torch.cos(beta * angles + gamma) + phi, torch.cat([shape, 1 - share], dim=1)
 
 
 def _angles(rotation: torch.Tensor) -> torch.Tensor:

@@ -23,9 +23,9 @@ CURVE_MARGIN_DEG = 10.0
 
 @dataclass(frozen=True)
 class Samples:
-    """faces float32 [N, 468, 3], normalised, level where shapes are; rotation float64 [N, 3, 3];
-    shapes float32 [H, 468, 3] of :func:`shapes_of`, and no factors; or factors float32 [N, 9] of the
-    grid's poses."""
+    """faces float32 [N, 468, 3], normalised, level where shapes are, NaN where a point is not seen; rotation
+    float64 [N, 3, 3]; shapes float32 [H, 468, 3] of :func:`shapes_of`, and no factors; or factors float32
+    [N, 9] of the grid's poses."""
 
     faces: np.ndarray
     rotation: np.ndarray

@@ -20,7 +20,7 @@ from downstream_hpe.networks.rigid_fit import RIGID_PARTS, RigidFit
 
 NETWORK_FILE = "network.safetensors"
 """Its name in a model folder."""
-FORMAT = "downstream-hpe network 3"
+FORMAT = "downstream-hpe network 4"
 _CONFIDENCE, _RIGID = "confidence.", "rigid."
 
 

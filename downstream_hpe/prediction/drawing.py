@@ -8,8 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from downstream_hpe.errors import DataError, UsageError
 from downstream_hpe.geometry.rotation import ANGLES
 from downstream_hpe.prediction.face import Face
+from downstream_hpe.prediction.given import Picture, rgb_of, without_copy
+from downstream_hpe.prediction.pose import Pose
 
 AXES = ((0, (255, 60, 60)), (1, (60, 210, 60)), (2, (70, 130, 255)))
 """Columns of R_C and their colours: image-right red, down green, and ahead of the nose blue."""
@@ -18,10 +21,47 @@ UNSURE = 0.7
 GREY = (185, 185, 185)
 EDGE = (15, 15, 15)
 SMALLEST = 384
-"""A drawn copy has at least so many pixels on its shorter side, for its text to be read."""
+"""A drawn copy has at least so many pixels on its shorter side, for its text to be read, unless the longer
+one would have more than LARGEST."""
+LARGEST = 4096
+LEAST = 2.0
+"""Pixels of a face's longer side."""
 
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom, pixels."""
+
+
+def draw(picture: Picture, pose: Pose | None) -> Image.Image:
+    """A copy of a picture, RGB, with the axes and angles of the faces of its pose.
+
+    picture: as :meth:`Predictor.predict` takes it; it is not changed. pose: what that gave for it; None: no
+    face, and nothing is drawn. Axes and colours as :func:`draw_faces`.
+
+    Raises
+    ------
+    DataError: no picture, or a pose without landmarks or of another picture. UsageError: no pose.
+
+    >>> from downstream_hpe import Predictor, draw
+    >>> draw(np.zeros((480, 640, 3), np.uint8), None).size
+    (640, 480)
+    """
+    if pose is not None and not isinstance(pose, Pose):
+        raise UsageError(f"draw: expected the Pose that predict gave of it, got {type(pose).__name__}")
+    image = Image.fromarray(rgb_of(picture))
+    faces = [] if pose is None else _faces(pose, image.size)
+    return _drawn(image, faces, len(faces) > 1)
+
+
+def _faces(pose: Pose, size: tuple[int, int]) -> list[Face]:
+    """size: width and height of the picture."""
+    if pose.landmarks is None or pose.in_range is None:
+        raise DataError("draw: the pose says not where its faces are; take one that a Predictor gave")
+    low, high = pose.landmarks[..., :2].min(axis=1), pose.landmarks[..., :2].max(axis=1)
+    if ((high - low).max(axis=1) < LEAST).any() or (low > size).any() or (high < 0).any():
+        raise DataError(f"draw: the pose's landmarks are no pixels of a picture of {size[0]} x {size[1]}")
+    confidences = [None] * len(pose) if pose.confidence is None else pose.confidence.tolist()
+    parts = (pose.landmarks, pose.rotation, pose.ypr_deg, confidences, pose.in_range.tolist())
+    return [Face(n, *each) for n, each in enumerate(zip(*parts, strict=True))]
 
 
 def draw_faces(bgr: np.ndarray, faces: Sequence[Face], numbered: bool = False) -> np.ndarray:
@@ -30,8 +70,13 @@ def draw_faces(bgr: np.ndarray, faces: Sequence[Face], numbered: bool = False) -
     Grey where the pose may not be believed: low confidence, or outside the trained range. Small
     pictures are enlarged. bgr: uint8 [H, W, 3]. numbered: with the indices of the faces.
     """
-    image = Image.fromarray(np.ascontiguousarray(bgr[..., ::-1]))
-    scale = max(1, -(-SMALLEST // min(image.size)))
+    image = Image.fromarray(without_copy(bgr))
+    return np.asarray(_drawn(image, faces, numbered))[..., ::-1]
+
+
+def _drawn(image: Image.Image, faces: Sequence[Face], numbered: bool) -> Image.Image:
+    """image: RGB; it may be drawn on."""
+    scale = max(1, min(-(-SMALLEST // min(image.size)), LARGEST // max(image.size)))
     if scale > 1:
         image = image.resize((image.width * scale, image.height * scale), Image.Resampling.LANCZOS)
     for face in faces:
@@ -42,7 +87,7 @@ def draw_faces(bgr: np.ndarray, faces: Sequence[Face], numbered: bool = False) -
     covered = [_middle(face, scale) for face in faces]
     for face in faces:
         covered.append(_label(draw, face, scale, image.size, numbered, covered))
-    return np.asarray(image)[..., ::-1]
+    return image
 
 
 def _axes(image: Image.Image, face: Face, scale: int) -> None:

@@ -218,7 +218,7 @@ def _unsqueeze(sizes: Sizes, node: Node, known: list[Shape]) -> list[Shape]:
 
 
 _SAME = """
-    Abs Acos Asin Atan Cast Clip Cos DequantizeLinear Elu Erf Exp Floor Gelu Identity LayerNormalization
+    Abs Acos Asin Atan Cast Clip Cos DequantizeLinear Elu Erf Exp Floor Gelu Identity IsNaN LayerNormalization
     LeakyRelu Log Neg Not QuantizeLinear Reciprocal Relu Selu Sigmoid Sign Sin Softmax Softplus Sqrt Tan Tanh
 """
 _BROADCAST = "Add And Div Equal Greater GreaterOrEqual Less LessOrEqual Max Min Mul Or PRelu Pow Sub Where"

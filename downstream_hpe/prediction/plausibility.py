@@ -13,16 +13,17 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy.special import expit
 
 from downstream_hpe.geometry.face_mesh import CHIN, FOREHEAD
+from downstream_hpe.geometry.mean_head import mean_head
+from downstream_hpe.geometry.partial import completed
 
 FACE_SHAPES = Path(__file__).parents[1] / "models" / "face_shapes.npz"
 """Made by scripts/make_face_shapes.py, which prints what its numbers are worth."""
 UPRIGHT_DEG = 60.0
-COUNTS = 0.25
-"""Of the logarithm of plausibility, which was fitted to extremes, so much counts for a confidence: masks and
-upside-down heads stay below a half."""
+DOUBTED, STEEP = 0.2, 3
+"""Plausibility, which was fitted to extremes, that halves a confidence, and the power with which it does:
+faces of photographs that come to less are placed badly, those above as well as any."""
 SOME = slice(None, None, 3)
 """The landmarks that are looked at: a third says as much."""
 LEAST_LEFT, LEAST_SIZE = 1e-9, 1e-9
@@ -48,11 +49,14 @@ class FaceShapes:
             return FaceShapes(file["mean"], file["basis"], file["weights"], float(file["bias"]))
 
     def quantities(self, landmarks: np.ndarray) -> np.ndarray:
-        """What the logistic function is of, [N, K + 1]. landmarks: float [N, 468, 3], any unit, frame C.
+        """What the logistic function is of, [N, K + 1]. landmarks: float [N, 468, 3], any unit, frame C, NaN
+        where a point is not seen.
 
         As ``normalise`` and ``fit_rotation``, in fewer and smaller steps: a single face is quick.
         """
         mean, face = self.mean[SOME], landmarks[:, SOME]
+        if np.isnan(face).any():
+            face = completed(face, mean)
         face = face - np.einsum("npi->ni", face)[:, None] / face.shape[1]
         size = np.sqrt(np.einsum("npi,npi->n", face, face) / face.shape[1])
         cross = np.swapaxes(face, 1, 2) @ mean
@@ -67,22 +71,25 @@ class FaceShapes:
 
     def plausibility(self, landmarks: np.ndarray) -> np.ndarray:
         """0 to 1, [N]. Arguments as :meth:`quantities`."""
-        return expit(self.bias - self.quantities(landmarks) @ self.weights)
+        # The logistic function; scipy's takes longer to import than all the rest.
+        return np.exp(-np.logaddexp(0, self.quantities(landmarks) @ self.weights - self.bias))
 
     def share(self, landmarks: np.ndarray) -> np.ndarray:
         """What is left of a confidence where faces are doubtful: 0 to 1, [N]. Arguments as above.
 
-        A root, so that less of what was seen counts: doubtful faces of photographs are often placed well.
+        p^3 / (p^3 + 0.2^3) of plausibility p: doubtful faces of photographs are placed well down to that.
         """
-        return self.plausibility(landmarks) ** COUNTS
+        return 1 / (1 + (DOUBTED / np.maximum(self.plausibility(landmarks), LEAST_SIZE)) ** STEEP)
 
 
 def quarter_turns(landmarks: np.ndarray) -> np.ndarray:
     """By how many quarter turns, clockwise in the picture, faces are from upright: int [N], 0 to 3.
 
     0 up to UPRIGHT_DEG, which forehead and chin stay within at any pose that is trained on; else the nearest.
-    landmarks: float [N, 468, 3], frame C.
+    landmarks: float [N, 468, 3], frame C, NaN where a point is not seen.
     """
+    if np.isnan(landmarks[:, [CHIN, FOREHEAD]]).any():
+        landmarks = completed(landmarks, mean_head())
     down = landmarks[:, CHIN] - landmarks[:, FOREHEAD]
     lean_deg = np.rad2deg(np.arctan2(-down[:, 0], down[:, 1]))
     return np.where(np.abs(lean_deg) < UPRIGHT_DEG, 0, np.rint(lean_deg / 90).astype(int) % 4)

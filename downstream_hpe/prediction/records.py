@@ -3,57 +3,58 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from downstream_hpe.errors import DataError, UsageError
+from downstream_hpe.errors import UsageError
 from downstream_hpe.escape import csv_text
 from downstream_hpe.geometry.rotation import ANGLES
 from downstream_hpe.prediction.face import Face
+from downstream_hpe.writing import writing
 
-SCHEMA = pa.schema(
-    [
-        ("input", pa.string()),  # the file, or webcam:N
-        ("frame", pa.int32()),  # of a video, from 0; null for a picture
-        ("time_s", pa.float64()),
-        ("face", pa.int32()),  # which face; null where none is found
-        ("found", pa.bool_()),
-        ("yaw_deg", pa.float64()),
-        ("pitch_deg", pa.float64()),
-        ("roll_deg", pa.float64()),
-        ("confidence", pa.float64()),  # 0 to 1; null where the model gives none
-        ("in_range", pa.bool_()),  # among the angles the model was trained on
-        ("box_x", pa.float64()),  # around the landmarks, pixels
-        ("box_y", pa.float64()),
-        ("box_width", pa.float64()),
-        ("box_height", pa.float64()),
-        ("axis_yaw_deg", pa.float64()),  # relative to the optical axis
-        ("axis_pitch_deg", pa.float64()),
-        ("axis_roll_deg", pa.float64()),
-        ("x_mm", pa.float64()),  # the pivot from the camera, frame C; null where no place fits
-        ("y_mm", pa.float64()),
-        ("z_mm", pa.float64()),
-        ("focal_px", pa.float64()),
-        ("camera_guessed", pa.bool_()),
-    ]
-)
-COLUMNS = tuple(SCHEMA.names)
+COLUMN_TYPES = {
+    "input": "string",  # the file, the address, webcam:N or stdin
+    "frame": "int32",  # of a video, from 0; null for a picture
+    "time_s": "double",
+    "face": "int32",  # which face, or box; null where none is found
+    "found": "bool",
+    "yaw_deg": "double",
+    "pitch_deg": "double",
+    "roll_deg": "double",
+    "confidence": "double",  # 0 to 1; null where the model gives none
+    "in_range": "bool",  # among the angles the model was trained on
+    "box_x": "double",  # around the landmarks, pixels
+    "box_y": "double",
+    "box_width": "double",
+    "box_height": "double",
+    "axis_yaw_deg": "double",  # relative to the optical axis
+    "axis_pitch_deg": "double",
+    "axis_roll_deg": "double",
+    "x_mm": "double",  # the pivot from the camera, frame C; null where no place fits
+    "y_mm": "double",
+    "z_mm": "double",
+    "focal_px": "double",
+    "camera_guessed": "bool",
+}
+"""Of a file of rows, as Arrow names them."""
+COLUMNS = tuple(COLUMN_TYPES)
 _ANGLES, _BOX, _PLACE = COLUMNS[5:8], COLUMNS[10:14], COLUMNS[14:20]
 ROWS_AT_ONCE = 1000
 
 Record = dict[str, Any]
 
 
-def record(name: str, frame: int | None, time_s: float | None, face: Face | None) -> Record:
-    """The row of a face, or of a picture or frame without one."""
+def record(
+    name: str, frame: int | None, time_s: float | None, face: Face | None, box: int | None = None
+) -> Record:
+    """The row of a face, or of a picture or frame without one. box: in which of those that were given it was
+    looked for."""
     row: Record = dict.fromkeys(COLUMNS)
-    row.update(input=name, frame=frame, time_s=time_s, found=face is not None)
+    row.update(input=name, frame=frame, time_s=time_s, face=box, found=face is not None)
     if face is not None:
         row.update(face=face.index, in_range=face.in_range)
         row.update(zip(_ANGLES, (round(float(angle), 3) for angle in face.ypr_deg), strict=True))
@@ -70,7 +71,7 @@ def text(row: Record, numbered: bool = False) -> str:
     """A row as people read it. numbered: with the index of the face, as there may be several."""
     where = row["input"] + (f" {row['time_s']:.2f} s" if row["frame"] is not None else "")
     if not row["found"]:
-        return f"{where}: no face found"
+        return f"{where}: no face found" + ("" if row["face"] is None else f" in box {row['face']}")
     parts = [f"face {row['face']}"] if numbered else []
     parts += [f"{name} {row[f'{name}_deg']:.1f}" for name in ANGLES]
     if row["confidence"] is not None:
@@ -82,6 +83,24 @@ def text(row: Record, numbered: bool = False) -> str:
     if not row["in_range"]:
         parts.append("outside the trained range")
     return f"{where}: {', '.join(parts)}"
+
+
+class _ParquetFile:
+    """Where rows go; pyarrow is imported for those alone who want such a file."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self._schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in COLUMN_TYPES.items()])
+        self._writer = pq.ParquetWriter(path, self._schema)
+        self._table = pa.Table
+
+    def write(self, rows: list[Record]) -> None:
+        self._writer.write_table(self._table.from_pylist(rows, schema=self._schema))
+
+    def close(self) -> None:
+        self._writer.close()
 
 
 class RecordWriter:
@@ -96,29 +115,28 @@ class RecordWriter:
         self._path = path
         self._rows: list[Record] = []
         self._stream: TextIO | None = None
-        try:
-            if path.suffix == ".csv":
+        with writing(path):
+            if path.suffix.lower() == ".csv":
                 self._stream = path.open("w", newline="", encoding="utf-8")
                 self._csv = csv.DictWriter(self._stream, COLUMNS, lineterminator="\n")
                 self._csv.writeheader()
-            elif path.suffix == ".parquet":
-                self._parquet = pq.ParquetWriter(path, SCHEMA)
+            elif path.suffix.lower() == ".parquet":
+                self._parquet = _ParquetFile(path)
             else:
                 raise UsageError(f"{path}: expected a .csv or .parquet file")
-        except OSError as error:
-            raise DataError(f"{path}: cannot be written ({error.strerror})") from error
 
     def add(self, row: Record) -> None:
-        """One row, in the order of calls."""
-        if self._stream is not None:
-            self._csv.writerow({**row, "input": csv_text(row["input"])})
-            return
-        self._rows.append(row)
-        if len(self._rows) == ROWS_AT_ONCE:
-            self._flush()
+        """One row, in the order of calls. DataError: it cannot be written."""
+        with writing(self._path):
+            if self._stream is not None:
+                self._csv.writerow({**row, "input": csv_text(row["input"])})
+                return
+            self._rows.append(row)
+            if len(self._rows) == ROWS_AT_ONCE:
+                self._flush()
 
     def _flush(self) -> None:
-        self._parquet.write_table(pa.Table.from_pylist(self._rows, schema=SCHEMA))
+        self._parquet.write(self._rows)
         self._rows = []
 
     def __enter__(self) -> RecordWriter:
@@ -127,9 +145,10 @@ class RecordWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._stream is not None:
-            self._stream.close()
-            return
-        if self._rows:
-            self._flush()
-        self._parquet.close()
+        with writing(self._path) if kind is None else contextlib.suppress(OSError):
+            if self._stream is not None:
+                self._stream.close()
+                return
+            if self._rows:
+                self._flush()
+            self._parquet.close()

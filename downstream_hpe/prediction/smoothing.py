@@ -7,6 +7,13 @@ import numpy as np
 
 from downstream_hpe.geometry.metrics import geodesic_errors
 
+MIN_CUTOFF = 1.0
+"""Hz at rest."""
+BETA = 0.05
+"""Hz a degree/s."""
+SPEED_CUTOFF = 1.0
+"""Hz, of the speed's own filter."""
+
 
 class OneEuroFilter:
     """Casiez, Roussel and Vogel, "1 Euro Filter", CHI 2012, with the angular speed as the speed.
@@ -14,10 +21,12 @@ class OneEuroFilter:
     cutoff = min_cutoff + beta |speed|,  a = 1 / (1 + 1 / (2 pi cutoff dt)),
     R <- nearest rotation to a R_new + (1 - a) R
 
-    min_cutoff: Hz at rest. beta: Hz a degree/s. speed_cutoff: Hz, of the speed's own filter.
+    min_cutoff, beta, speed_cutoff: see the constants.
     """
 
-    def __init__(self, min_cutoff: float = 1.0, beta: float = 0.05, speed_cutoff: float = 1.0) -> None:
+    def __init__(
+        self, min_cutoff: float = MIN_CUTOFF, beta: float = BETA, speed_cutoff: float = SPEED_CUTOFF
+    ) -> None:
         self._min_cutoff, self._beta, self._speed_cutoff = min_cutoff, beta, speed_cutoff
         self._state: tuple[np.ndarray, np.ndarray, float, float] | None = None
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from downstream_hpe.prediction.detector import DOUBTFUL, turned_back
+from downstream_hpe.prediction.followed import Followed
 from downstream_hpe.prediction.plausibility import FaceShapes, quarter_turns
 from downstream_hpe.prediction.predictor import Predictor
 
@@ -23,18 +24,26 @@ class WayUp:
     def __init__(self) -> None:
         self.quarter = 0
         self._tried_s = -np.inf
+        self._followed: Followed | None = None
 
     def faces(self, predictor: Predictor, bgr: np.ndarray, limit: int, time_s: float) -> np.ndarray:
         """Landmarks [F, 468, 3] in the pixels of a frame as it is, as :meth:`Predictor.faces`."""
         turned = np.ascontiguousarray(np.rot90(bgr, self.quarter))
-        found = turned_back(predictor.faces(turned, limit, False), bgr, self.quarter)
+        seen = predictor.faces(turned, limit, False)
+        if limit > 1:
+            if self._followed is None:
+                self._followed = Followed(turned.shape[1], turned.shape[0])
+            seen = self._followed.and_others(predictor, turned, seen, limit)
+        found = turned_back(seen, bgr, self.quarter)
         if len(_plausible(found)) or time_s - self._tried_s < PATIENCE_S:
             return found
         self._tried_s = time_s
         again = predictor.faces(bgr, limit, True)
         plausible = _plausible(again)
         if len(plausible):
-            self.quarter = int(quarter_turns(plausible)[0])
+            before, self.quarter = self.quarter, int(quarter_turns(plausible)[0])
+            if self.quarter != before:
+                self._followed = None
         return again if len(again) else found
 
 

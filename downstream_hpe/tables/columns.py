@@ -20,7 +20,8 @@ INDEX_COLUMNS = tuple(f"{angle}_index" for angle in ANGLES)
 HEAD_COLUMNS = ("subject", "expression")
 WORN = ("mask", "occluder", "glasses", "beard", "headwear", "headphones")
 """What heads wear, and is before them: columns ``look_...``, whose values are styles."""
-_TEXTS = {*HEAD_COLUMNS, "split", "projection", *(f"look_{kind}" for kind in WORN)}
+_TEXTS = {*HEAD_COLUMNS, "split", "projection", "image_path", *(f"look_{kind}" for kind in WORN)}
+_FLAGS = {"landmarks_visible"}
 _LISTS = {"rotation", "landmarks", "landmarks_exact", "camera", "translation_mm"}
 
 
@@ -39,9 +40,10 @@ def _is_of_its_kind(name: str, kind: pa.DataType) -> bool:
     if name in _TEXTS:
         kind = kind.value_type if pa.types.is_dictionary(kind) else kind
         return pa.types.is_string(kind) or pa.types.is_large_string(kind)
-    if name in _LISTS:
+    if name in _LISTS | _FLAGS:
         lists = (pa.types.is_fixed_size_list, pa.types.is_list, pa.types.is_large_list)
-        return any(is_one(kind) for is_one in lists) and pa.types.is_floating(kind.value_type)
+        of = pa.types.is_boolean if name in _FLAGS else pa.types.is_floating
+        return any(is_one(kind) for is_one in lists) and bool(of(kind.value_type))
     if name in INDEX_COLUMNS:
         return pa.types.is_integer(kind)
     return pa.types.is_boolean(kind) if name == "detected" else pa.types.is_floating(kind)

@@ -10,7 +10,7 @@ from downstream_hpe.evaluation.reliability import reliability
 from downstream_hpe.geometry.metrics import geodesic_errors
 from downstream_hpe.geometry.normalise import normalise
 from downstream_hpe.geometry.rotation import rotation_from_angles
-from downstream_hpe.networks.confidence import calibrate, level_faces
+from downstream_hpe.networks.confidence import QUANTITIES, calibrate, level_faces
 
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
 COUNT = 800
@@ -104,7 +104,7 @@ def test_a_few_rows_decide_nothing(confidence):
     estimate[:10], true[:10] = [0, 0, 35], rotation_from_angles(np.array([6.0, 0, 35]))
     features, found = normalise(landmarks).reshape(COUNT, -1), rotation_from_angles(estimate)
     again = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
-    assert 400 <= again.weights[-1] < 1200
+    assert 400 <= again.weights[QUANTITIES.index("beyond roll")] < 1200
     assert again.of(features, estimate, found)[:10].mean() > 0.15
 
 
@@ -120,3 +120,13 @@ def test_what_plausibility_takes_is_not_taken_twice(confidence):
     plain = calibrate(level, RANGE, features, estimate, found, true, np.ones(COUNT))
     assert graph.mean() > plain.of(features, estimate, found).mean() + 0.02
     assert (0.8 * graph).mean() == pytest.approx((geodesic_errors(found, true) < 5).mean(), abs=0.1)
+
+
+def test_it_falls_with_what_is_not_seen(confidence):
+    landmarks, ypr = faces(14)
+    rng = np.random.default_rng(15)
+    means = [
+        asked(confidence, np.where(rng.random((COUNT, 468, 1)) < share, landmarks, np.nan), ypr).mean()
+        for share in (1.0, 0.6, 0.2)
+    ]
+    assert means[0] > means[1] + 0.03 > means[2] + 0.06

@@ -49,6 +49,19 @@ def test_relative_error_is_the_true_one(noisy):
     assert refined.relative_error < fit.relative_error
 
 
+def test_refined_factors_are_the_best_beside_each_other(noisy):
+    """Each spans the leading vectors of the tensor contracted with the other three."""
+    fit = decompose(noisy, refinements=2)
+    factors = (fit.identity, *fit.poses)
+    for mode, factor in enumerate(factors):
+        left = noisy.values
+        for other in {*range(4)} - {mode}:
+            left = np.moveaxis(np.tensordot(factors[other].T, left, (1, other)), 0, other)
+        unfolded = np.moveaxis(left, mode, 0).reshape(len(factor), -1)
+        best = np.linalg.svd(unfolded, full_matrices=False)[0][:, : factor.shape[1]]
+        np.testing.assert_allclose(np.linalg.svd(best.T @ factor, compute_uv=False), 1, atol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("refinements", [0, 3])
 def test_agrees_with_tensorly(noisy, refinements):
@@ -117,8 +130,10 @@ def test_missing_cells_are_recovered(clean):
 def test_missing_cells_that_do_not_converge_say_so(clean):
     observed = clean.observed.copy()
     observed[0, 0, 0, 0] = False
+    rounds = []
     with pytest.raises(DataError, match="did not converge in 1 rounds"):
-        decompose(ArrayTensor(clean.values, observed), max_rounds=1)
+        decompose(ArrayTensor(clean.values, observed), max_rounds=1, progress=lambda n, _: rounds.append(n))
+    assert rounds == [1]
 
 
 def test_what_cannot_be_decomposed_is_refused(clean):
@@ -126,6 +141,10 @@ def test_what_cannot_be_decomposed_is_refused(clean):
         decompose(clean, (5, 3, 3, 6))
     with pytest.raises(DataError, match="9 heads, too few for rank 10"):
         decompose(clean, (10, 3, 3, 3))
+    with pytest.raises(DataError, match="rank 0"):
+        decompose(clean, (5, 3, 0, 3))
+    assert decompose(clean, (9, 5, 5, 5)).core.shape == (9, 5, 5, 5, 1404), "all that there is"
+    assert decompose(clean, (1, 1, 1, 1)).core.shape == (1, 1, 1, 1, 1404)
     observed = clean.observed.copy()
     observed[:, 2] = False
     with pytest.raises(DataError, match="no landmarks at all for yaw number 2"):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -99,3 +100,9 @@ def test_tables_that_cannot_be_written(tmp_path):
     for name in ("t.csv", "t.parquet"):
         with pytest.raises(DataError, match="cannot be written"):
             RecordWriter(tmp_path / "nowhere" / name)
+    if Path("/dev/full").exists():
+        for name in ("full.csv", "full.parquet"):
+            (tmp_path / name).symlink_to("/dev/full")
+            full = pytest.raises(DataError, match=rf"{name}: cannot be written \(.*No space left on device")
+            with full, RecordWriter(tmp_path / name) as writer:
+                writer.add(record("a.png", None, None, face()))

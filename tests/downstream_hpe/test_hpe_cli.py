@@ -10,6 +10,8 @@ import sys
 
 import ideal
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from downstream_hpe import cli, fitting
@@ -94,6 +96,71 @@ def test_confidence_is_calibrated_on_others(dataset, extra, tmp_path, monkeypatc
     assert "confidence calibrated on 128 faces of 2 subjects" in capsys.readouterr().err
     assert run(*short, extra, "--extra", extra, "--out", tmp_path / "none", monkeypatch=monkeypatch) == 1
     assert "every subject is trained on; calibrate on others" in capsys.readouterr().err
+
+
+def test_faces_near_the_end_of_a_dataset_are_left_to_a_wider_one(dataset, tmp_path, monkeypatch, capsys):
+    [face] = ideal.Faces().draw(1, np.random.default_rng(4))
+    wide = (np.array([-85.0, 0, 85]), *(axis[1:] for axis in ideal.AXES[1:]))
+    columns = ideal.rows(face, "w0", wide)
+    columns |= {f"{angle}_index": np.full(48, -1, np.int16) for angle in ("yaw", "pitch", "roll")}
+    ideal.write(tmp_path / "wide" / "data" / "part.parquet", columns)
+    counted_from("canonical", tmp_path / "wide")
+    fit = [
+        "fit",
+        dataset,
+        "--missing",
+        "frontal",
+        "--epochs",
+        "1",
+        "--threads",
+        "1",
+        "--out",
+        tmp_path / "model",
+    ]
+    assert run(*fit, "--extra", tmp_path / "wide", monkeypatch=monkeypatch) == 0
+    said = re.search(r"(\d+) faces left out: near the end of their dataset", capsys.readouterr().err)
+    # Of eight heads, the two yaws of 50 degrees: 25 poses each, a few of which were not found.
+    assert said is not None and abs(int(said[1]) - 8 * 50) < 20
+
+
+def test_partial_faces_are_learned_from_and_scored(dataset, extra, tmp_path, monkeypatch, capsys):
+    """Half faces, of which no detector found one."""
+    seen = tmp_path / "seen"
+    for n, face in enumerate(ideal.Faces().draw(3, np.random.default_rng(3))):
+        columns = ideal.rows(face, f"p{n}", tuple(axis[1:] for axis in ideal.AXES))
+        points = columns["landmarks"].astype(float).reshape(-1, 468, 3) - 128
+        columns["landmarks_exact"] = (points + np.array([0, 0, 700.0])).reshape(-1, 1404)
+        columns["landmarks_visible"] = points[..., 0] < np.median(points[..., 0], axis=1, keepdims=True)
+        columns["camera"] = np.tile([800.0, 0, 128, 0, 800, 128, 0, 0, 1], (64, 1))
+        columns["translation_mm"] = np.tile([0.0, 0, 700], (64, 1))
+        columns["projection"] = np.array(["orthographic"] * 64)
+        for row in range(0, 64, 2):
+            ideal.drop(columns, row)
+        ideal.write(seen / "data" / f"part-{n}.parquet", columns)
+    counted_from("canonical", seen)
+    fit = ["fit", seen, "--missing", "exact", "--validation", "0", "--ranks", "2,3,3,3", "--threads", "1"]
+    fit += ["--epochs", "4", "--calibrate", extra, "--out", tmp_path / "model"]
+    assert run(*fit, "--recipe", "paper", "--partial", monkeypatch=monkeypatch) == 2
+    assert "the paper's recipe learns from whole faces alone" in capsys.readouterr().err
+    assert run(*fit, "--partial", monkeypatch=monkeypatch) == 0
+    assert "128 faces (32 of them partial) of 3 subjects" in capsys.readouterr().err
+    others = tmp_path / "others"
+    for file in sorted((seen / "data").iterdir()):
+        columns = pq.read_table(file).to_pydict()
+        columns["subject"] = [f"other {name}" for name in columns["subject"]]
+        (others / "data").mkdir(parents=True, exist_ok=True)
+        schema = pq.read_schema(file)
+        pq.write_table(pa.table(columns, schema=schema), others / "data" / file.name)
+    counted_from("canonical", others)
+    scores = {}
+    for name, options in {"whole": (), "half": ("--partial",)}.items():
+        assert run("evaluate", tmp_path / "model", others, *options, "--json", monkeypatch=monkeypatch) == 0
+        scores[name] = json.loads(capsys.readouterr().out)
+    assert [entry["rows"] for entry in scores["half"]] == [96] * 4
+    found = {entry["estimator"]: entry["mae"] for entry in scores["half"]}
+    assert found["encoder + heads"] < 0.2 * found["constant zero"]
+    assert run("evaluate", tmp_path / "model", extra, "--partial", monkeypatch=monkeypatch) == 1
+    assert "no column landmarks_exact; leave out --partial" in capsys.readouterr().err
 
 
 def test_evaluate_leaves_out_what_was_trained_on(model, dataset, tmp_path, monkeypatch, capsys):

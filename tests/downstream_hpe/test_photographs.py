@@ -216,7 +216,7 @@ def test_what_is_damaged_is_left_out_with_a_line_each(tmp_path):
         *(f"{name}.mat: no Pose_Para can be read from it" for name in "bcdefg"),
         "h.mat: Pose_Para is [nan, nan, nan, nan, nan, nan, nan], expected pitch, yaw, roll, ...",
         "i.mat: there is no such label beside i.jpg",
-        "j.jpg: not a readable picture",
+        "j.jpg: not a readable picture; it holds text",
         "k.jpg: there is no such picture",
     ]
 
@@ -235,7 +235,7 @@ def test_damaged_frames_of_biwi_are_left_out_with_a_line_each(tmp_path):
         "frame_00004_pose.txt: its first three lines are not a rotation",
         "frame_00005_pose.txt: expected 12 numbers, a rotation and a place",
         "frame_00006_pose.txt: there is no such file",
-        "frame_00007_rgb.png: not a readable picture",
+        "frame_00007_rgb.png: not a readable picture; it holds text",
     ]
     # A calibration that cannot be read would spoil them all.
     (frames / "rgb.cal").write_text("517 0")

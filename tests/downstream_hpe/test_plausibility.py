@@ -12,7 +12,7 @@ from downstream_hpe.geometry.metrics import geodesic_errors
 from downstream_hpe.geometry.rotation import fit_rotation, rotation_from_angles
 from downstream_hpe.prediction import detector
 from downstream_hpe.prediction.detector import FaceDetector
-from downstream_hpe.prediction.plausibility import FaceShapes, quarter_turns
+from downstream_hpe.prediction.plausibility import DOUBTED, STEEP, FaceShapes, quarter_turns
 from downstream_hpe.prediction.predictor import Predictor
 
 QUARTERS = rotation_from_angles(np.array([[0.0, 0, 90 * k] for k in range(4)]))
@@ -53,7 +53,8 @@ def test_a_model_is_less_sure_where_there_may_be_no_face(tmp_path):
     graph = predictor.graph(doubtful.astype(np.float32))["confidence"]
     share = FaceShapes.load().share(doubtful)
     np.testing.assert_allclose(predictor.from_landmarks(doubtful).confidence, graph * share, rtol=1e-5)
-    np.testing.assert_allclose(share**4, FaceShapes.load().plausibility(doubtful))
+    p = FaceShapes.load().plausibility(doubtful)
+    np.testing.assert_allclose(share, p**STEEP / (p**STEEP + DOUBTED**STEEP))
 
 
 def test_no_pose_of_the_range_counts_as_on_its_side():

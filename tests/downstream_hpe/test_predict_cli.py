@@ -186,6 +186,12 @@ MISTAKES = {
     "no video in the file": (["predict", "text.mp4"], 1, "text.mp4: cannot be opened as video"),
     "no webcam": (["predict", "webcam:63"], 1, "webcam:63: there is no such webcam"),
     "no table": (["predict", "a.png", "--out", "t.xls"], 2, "t.xls: expected a .csv or .parquet file"),
+    "overwriting the picture": (["predict", "a.png", "--out", "./a.png"], 2, "a.png: --out would overwrite"),
+    "overwriting boxes": (
+        ["predict", "a.png", "--boxes", "boxes.csv", "--out", "boxes.csv"],
+        2,
+        "boxes.csv: --out would overwrite what is read",
+    ),
     "no number of a webcam": (["predict", "webcam:-1"], 2, "webcam:-1: expected a number"),
     "no room for the copies": (["predict", "a.png", "--draw", "a.png/d"], 1, "cannot be written"),
     "no folder for the report": (["evaluate", "headturn", "d", "--out", "text.png"], 2, "takes a folder"),
@@ -221,3 +227,14 @@ def test_no_face_anywhere_fails(shipped, tmp_path, monkeypatch, capsys):
     Image.new("RGB", (64, 64)).save(tmp_path / "a.png")
     assert run("predict", tmp_path / "a.png", monkeypatch=monkeypatch) == 1
     assert capsys.readouterr().err.splitlines()[-1] == "downstream-hpe: no face found"
+
+
+def test_one_picture_that_is_too_long_ends_no_folder(shipped, photograph, tmp_path, monkeypatch, capfd):
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    Image.new("L", (40_000, 8)).save(pictures / "a_line.png")
+    photograph.save(pictures / "portrait.png")
+    assert run("predict", pictures, monkeypatch=monkeypatch) == 3
+    output, errors = capfd.readouterr()
+    assert "a_line.png: " in errors and "32,766" in errors
+    assert "portrait.png: yaw" in output

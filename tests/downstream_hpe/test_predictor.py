@@ -54,6 +54,23 @@ def test_points_of_irises_are_taken_and_left_out(tmp_path):
             model.from_landmarks(points)
 
 
+def test_missing_points_are_for_models_that_take_partial_faces(tmp_path):
+    model = load(tiny_model(), tmp_path)
+    half = np.where(np.arange(468)[:, None] < 234, FACE, np.nan)
+    with pytest.raises(ModelError, match="takes complete faces, and points are missing"):
+        model.from_landmarks(half)
+    for points, says in (
+        (
+            np.where(np.arange(468)[:, None] < 19, FACE, np.nan),
+            "19 landmarks of a face, expected at least 20",
+        ),
+        (np.full_like(FACE, np.nan), "leave out faces that were not detected"),
+        (np.where(np.arange(468)[:, None] == 3, np.inf, FACE), "leave out faces that were not detected"),
+    ):
+        with pytest.raises(DataError, match=says):
+            model.from_landmarks(points)
+
+
 def test_angles_inside_and_outside_the_trained_range(tmp_path):
     inside = load(tiny_model(), tmp_path).in_range(np.array([[50, -40, 30], [51, 0, 0], [0, 0, -31]]))
     assert inside.tolist() == [True, False, False]

@@ -32,6 +32,8 @@ def test_new_ideal_faces_off_the_grid_within_a_hundredth(estimator):
     assert found.converged.all()
     assert np.abs(found.ypr_deg - ypr).max() < 0.01
     assert found.residual.max() < 1e-6
+    features = normalise(landmarks).reshape(300, -1)
+    assert estimator.estimate(features, max_steps=4).converged.mean() > 0.9, "frames of a camera do not wait"
 
 
 def test_residual_is_that_of_the_objective(estimator):

@@ -151,3 +151,17 @@ def test_files_that_are_no_camera(tmp_path, facts):
     with pytest.raises(DataError, match=r'k\.json: .*expected \{"K"') as caught:
         camera_file(write(tmp_path / "k.json", facts))
     assert "\n" not in str(caught.value)
+
+
+def test_a_partial_face_is_where_the_whole_one_is():
+    """The shipped model and a camera; points right of the middle are not seen, chin or forehead with them."""
+    model = Predictor.load()
+    rotation = rotation_from_angles(YPR_DEG)
+    whole = seen(CAMERA, rotation, PLACES_MM)
+    middle = np.median(whole[..., :1], axis=1, keepdims=True)
+    half = np.where(whole[..., :1] > middle, np.nan, whole)
+    expected, found = (model.from_landmarks(points, CAMERA) for points in (whole, half))
+    assert np.isfinite(found.translation_mm).all()
+    assert geodesic_errors(found.axis_rotation, expected.axis_rotation).max() < 10
+    off = np.linalg.norm(found.translation_mm - expected.translation_mm, axis=1)
+    assert (off < 0.08 * np.linalg.norm(PLACES_MM, axis=1)).all()

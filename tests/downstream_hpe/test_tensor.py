@@ -273,6 +273,35 @@ def test_rows_leave_out_the_undetected_and_keep_the_split(tmp_path, heads):
         read_rows(tmp_path, "test")
 
 
+def test_rows_without_a_face_are_partial_faces_of_what_is_seen(tmp_path, heads):
+    rng = np.random.default_rng(4)
+    for columns in heads.values():
+        points = columns["landmarks"].astype(float).reshape(-1, 468, 3) - 128
+        columns["landmarks_exact"] = (points + np.array([0, 0, 700.0])).reshape(-1, 1404)
+        columns["landmarks_visible"] = rng.random((len(points), 468)) < 0.5
+        columns |= camera_columns(len(points), "orthographic", 700.0)
+    heads["bob"]["landmarks_visible"][8, 19:] = False  # too few
+    visible = heads["bob"]["landmarks_visible"][GONE]
+    expected = heads["bob"]["landmarks"][GONE].reshape(468, 3).copy()
+    for row in (GONE, 8):
+        ideal.drop(heads["bob"], row)
+    write_heads(tmp_path, heads)
+    found = read_rows(tmp_path, partial=True)
+    assert (len(found), found.undetected) == (3 * 125 - 1, 1)
+    partial = found.take(~found.complete)
+    assert partial.heads.tolist() == ["bob/neutral"]
+    np.testing.assert_array_equal(np.isnan(partial.landmarks[0]).all(axis=1), ~visible)
+    # Both begin where their depth does.
+    seen = partial.landmarks[0, visible]
+    np.testing.assert_allclose(np.ptp(seen, axis=0), np.ptp(expected[visible], axis=0) * 800 / 700, rtol=1e-4)
+    np.testing.assert_array_equal(found.take(found.complete).landmarks, read_rows(tmp_path).landmarks)
+
+
+def test_partial_faces_need_exact_landmarks(dataset):
+    with pytest.raises(DataError, match="no column landmarks_exact; leave out --partial"):
+        read_rows(dataset, partial=True)
+
+
 def test_the_contract_is_what_the_generator_writes(tmp_path):
     schema = pytest.importorskip("generator.dataset.format.schema")
     written = schema.part_schema("none", {}, "")

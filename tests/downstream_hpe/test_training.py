@@ -32,7 +32,7 @@ from downstream_hpe.networks.training import train  # noqa: E402
 from downstream_hpe.networks.weights import Weights  # noqa: E402
 from downstream_hpe.prediction.predictor import Pose, Predictor  # noqa: E402
 
-SMALL = Recipe(layers=(FACTORS + 5, 32, 9), head_layers=(3, 16, 1), epochs=2, batch=64)
+SMALL = Recipe(layers=(FACTORS + 5 + 1, 32, 9), head_layers=(3, 16, 1), epochs=2, batch=64)
 RANGE = np.array([[-50.0, 50], [-40, 40], [-30, 30]])
 
 
@@ -151,7 +151,7 @@ def test_onnx_equals_torch_from_raw_landmarks(rows, confidence, tmp_path, normal
     torch.manual_seed(0)
     network = PoseNetwork().eval()
     # What an untrained network answers is small: within the range, or beyond a share of it. All counts.
-    weights = np.array([*confidence.weights[:6], 3e3, 4e3, 5e3, 4e4, 5e4, 6e4])
+    weights = np.array([*confidence.weights[:6], 3e3, 4e3, 5e3, 4e4, 5e4, 6e4, 1e2])
     confidence = replace(confidence, range_deg=share * RANGE, weights=weights)
     export_onnx(Weights(network, normalisation, RANGE, confidence), tmp_path / "model.onnx")
     predictor = Predictor.load(tmp_path)
@@ -198,7 +198,7 @@ def test_saved_models_come_back(rows, model, confidence, tmp_path):
     again = TensorModel.load(tmp_path / "t.safetensors")
     found = again.estimator().from_landmarks(rows.landmarks[:20])
     assert np.abs(found.ypr_deg - rows.ypr_deg[:20]).max() < 0.01
-    with pytest.raises(ModelError, match="expected 'downstream-hpe network 3'"):
+    with pytest.raises(ModelError, match="expected 'downstream-hpe network 4'"):
         Weights.load(tmp_path / "t.safetensors")
 
 

@@ -73,6 +73,8 @@ def dataset_seeds() -> Iterator[tuple[str, bytes]]:
         yield "manifest", RAW + (root / "manifest.json").read_bytes()
         yield "hpe_manifest", RAW + b'{"configuration": {"poses": {"frame": "canonical"}}}'
         matrix = b"[[900.0, 0, 500], [0, 900.0, 375], [0, 0, 1]]"
+        yield "boxes", RAW + b"picture,x,y,w,h\na.png,20,30.5,99,100\n"
+        yield "boxes", b'\x40[{"picture": "a.png", "x": 20, "y": 30.5, "w": 99, "h": 100}]'
         yield "camera", RAW + b'{"K": %b, "width": 1000, "height": 750}' % matrix
         [file] = root.glob("data/*/*.parquet")
         row = pq.read_table(file)

