@@ -130,6 +130,12 @@ def shifted(unit: UnitRows, off: tuple[float, float]) -> np.ndarray:
     return np.concatenate([camera.project(points) + off, depth], axis=-1).astype(np.float32)
 
 
+def replaced(batch: pa.RecordBatch, name: str, column: pa.Array) -> pa.RecordBatch:
+    """With another column of this name."""
+    place = batch.schema.get_field_index(name)
+    return batch.set_column(place, batch.schema.field(place), column.cast(batch.schema.field(place).type))
+
+
 def head_row(subject: str, split: str) -> HeadRow:
     return HeadRow(
         subject=subject,

@@ -30,7 +30,7 @@ from generator.dataset.format.open import as_array
 from generator.dataset.format.part import read_part
 from generator.dataset.format.schema import part_schema
 from generator.dataset.format.unit_rows import unit_table
-from generator.dataset.proof.compare import compared_columns, row_differences
+from generator.dataset.proof.compare import StoredFile, compared_columns, row_differences
 from generator.dataset.proof.row_checks import ROW_CHECKS, row_checks
 from generator.dataset.proof.verify import check_names, verify_dataset
 from generator.dataset.show.column_tables import heads_table, rows_table
@@ -227,3 +227,31 @@ def test_what_is_compared_and_how_it_is_said(rows) -> None:
         "the image differs",
         "the floats of the passes differ",
     ]
+
+
+@pytest.mark.parametrize(
+    ("file", "then", "now", "said"),
+    [
+        ("a", "a", "a", None),
+        ("a", "a", "b", "the image differs: far"),
+        ("b", "a", "a", "a.png was changed after the build: far; what is rendered now has the recorded hash"),
+        ("b", "a", "b", "a.png is what is rendered now; the hash in its row is not its own and was changed"),
+        ("c", "a", "b", "a.png has not the hash in its row, and what is rendered now has neither's: far"),
+    ],
+)
+def test_file_row_and_what_is_rendered_now(rows, file: str, then: str, now: str, said: str | None) -> None:
+    row = unit_table(rows, part_schema("none", {}, "")).to_pylist()[0]
+    stored = {"image_sha256": StoredFile("a.png", file, lambda: ": far")}
+    found = row_differences({**row, "image_sha256": then}, {**row, "image_sha256": now}, stored)
+    assert [line.removesuffix(": file, row or both were changed") for line in found] == (
+        [said] if said else []
+    )
+
+
+def test_numbers_that_are_not_as_many_differ_by_none(rows) -> None:
+    row = unit_table(rows, part_schema("none", {}, "")).to_pylist()[0]
+    few = {**row, "landmarks_exact": row["landmarks_exact"][:4]}
+    assert row_differences(row, few) == ["landmarks_exact differ"]
+    x, y, *rest = row["landmarks_exact"]
+    moved = {**row, "landmarks_exact": [x + 0.25, y - 0.5, *rest]}
+    assert row_differences(row, moved) == ["landmarks_exact differ: up to 0.5 mm"]

@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+import os
 import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +18,11 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from generator.dataset.export.fsanet_npz import cropped
+from generator.dataset.export.huggingface import size_category
 from generator.dataset.export.options import ExportOptions
 from generator.dataset.export.run import export_dataset
+from generator.dataset.export.sample import Sample
 from generator.geometry.camera import Camera
 from generator.landmarks.topology import FACE_MESH
 from generator.registries import FORMATS
@@ -49,28 +55,30 @@ def picture(path: Path) -> Image.Image:
         return image.copy()
 
 
-def test_nlml_hpe_as_its_code_looks_for_files(source, rows, tmp_path):
-    done = export_dataset(source, "nlml-hpe", tmp_path / "out")
+@pytest.mark.parametrize("suffix", ["jpg", "png"])
+def test_nlml_hpe_as_its_code_looks_for_files(source, rows, tmp_path, suffix):
+    chosen = {} if suffix == "jpg" else {"image_format": suffix}
+    done = export_dataset(source, "nlml-hpe", tmp_path / "out", ExportOptions(**chosen))
     assert (done.rows, done.heads, done.left_out) == (36, 2, 0)
-    identities = sorted((p.name for p in (tmp_path / "out").iterdir() if p.is_dir()), key=int)
-    assert identities == ["1", "2"]
     with (tmp_path / "out" / "identities.csv").open(newline="") as file:
         subjects = {row["id"]: row["subject"] for row in csv.DictReader(file)}
-    found = 0
-    for identity in identities:
-        for yaw in np.arange(-30, 31, 30):
-            for pitch in np.arange(-20, 21, 20):
-                for roll in np.arange(0, 11, 10):
-                    path = tmp_path / "out" / identity / f"ID{identity}_({yaw}_{pitch}_{roll}).jpg"
-                    shown = np.asarray(picture(path), float)
-                    name = f"{subjects[identity]}/neutral/y{yaw:+}_p{pitch:+}_r{roll:+}"
-                    original = np.asarray(picture(source / rows[name]["image_path"]), float)
-                    assert np.abs(shown - original).mean() < 3  # JPEG, and the right picture
-                    angles = [float(angle) for angle in re.findall(r"-?\d+", path.stem.split("_", 1)[1])]
-                    derived = Rotation.from_euler("XYZ", [-angles[1], angles[0], angles[2]], degrees=True)
-                    np.testing.assert_allclose(derived.as_matrix(), rotation(rows[name]), atol=1e-12)
-                    found += 1
-    assert found == 36
+    found = set()
+    for split, expected in (("train", ["1"]), ("validation", ["2"])):
+        identities = sorted(os.listdir(tmp_path / "out" / split), key=int)  # every name is a number
+        assert identities == expected
+        for identity in identities:
+            for yaw, pitch, roll in product((-30, 0, 30), (-20, 0, 20), (0, 10)):
+                path = tmp_path / "out" / split / identity / f"ID{identity}_({yaw}_{pitch}_{roll}).{suffix}"
+                shown = np.asarray(picture(path), float)
+                name = f"{subjects[identity]}/neutral/y{yaw:+}_p{pitch:+}_r{roll:+}"
+                assert rows[name]["split"] == split
+                original = np.asarray(picture(source / rows[name]["image_path"]), float)
+                assert np.abs(shown - original).mean() < (3 if suffix == "jpg" else 1e-9)  # the right picture
+                angles = [float(angle) for angle in re.findall(r"-?\d+", path.stem.split("_", 1)[1])]
+                derived = Rotation.from_euler("XYZ", [-angles[1], angles[0], angles[2]], degrees=True)
+                np.testing.assert_allclose(derived.as_matrix(), rotation(rows[name]), atol=1e-12)
+                found.add(path)
+    assert found == {path for path in (tmp_path / "out").glob("*/*/*")} and len(found) == 36
 
 
 def test_facescape_ids_are_kept(tmp_path, build):
@@ -79,7 +87,7 @@ def test_facescape_ids_are_kept(tmp_path, build):
     heads = tuple(replace(head, subject=name) for head, name in zip(HEADS, ("122", "340"), strict=True))
     build(tmp_path / "d", heads=heads)
     export_dataset(tmp_path / "d", "nlml-hpe", tmp_path / "out")
-    assert (tmp_path / "out" / "340" / "ID340_(0_0_0).jpg").is_file()
+    assert (tmp_path / "out" / "validation" / "340" / "ID340_(0_0_0).jpg").is_file()
 
 
 @pytest.mark.parametrize("landmarks", ["exact", "detected"])
@@ -123,7 +131,7 @@ def test_300w_lp_read_by_scipy(source, rows, tmp_path, landmarks):
 
 def test_300w_lp_of_an_orthographic_camera_is_weak_perspective_itself(tmp_path, build):
     sio = pytest.importorskip("scipy.io")
-    build(tmp_path / "d", camera=Camera.square(64, 85.0, 700.0, "orthographic"))
+    build(tmp_path / "d", camera=Camera(96, 64, 85.0, 700.0, "orthographic", (40.0, 36.0)))
     export_dataset(tmp_path / "d", "300w-lp", tmp_path / "out")
     rows = {row["sample_id"]: row for row in pq.read_table(tmp_path / "d" / "data").to_pylist()}
     row = rows["s1/neutral/y-30_p+20_r+10"]
@@ -168,6 +176,111 @@ def test_6drepnet_labels(source, rows, tmp_path):
         assert (tmp_path / "out" / image).read_bytes() == (source / row["image_path"]).read_bytes()
 
 
+def test_fsanet_npz_as_its_loaders_take_it(source, rows, tmp_path):
+    """d["image"], d["pose"]: FSA-Net's load_data_npz, 6DRepNet's BIWI and our own evaluate."""
+    from downstream_hpe.evaluation.photographs import LeftOut, biwi_npz
+
+    export_dataset(source, "fsanet-npz", tmp_path / "out")
+    seen = set()
+    for split in ("train", "validation"):
+        path = tmp_path / "out" / f"{split}.npz"
+        with np.load(path, allow_pickle=False) as packed:
+            image, pose, names = packed["image"], packed["pose"], packed["name"].tolist()
+            assert packed["img_size"] == 64
+        assert image.shape == (18, 64, 64, 3) and image.dtype == np.uint8
+        for picked, angles, name, photograph in zip(
+            image, pose, names, biwi_npz(path, LeftOut()), strict=True
+        ):
+            row = rows[name]
+            assert row["split"] == split
+            assert angles.tolist() == [row["yaw_deg"], row["pitch_deg"], row["roll_deg"]]
+            np.testing.assert_allclose(photograph.rotation, rotation(row), atol=1e-12)
+            np.testing.assert_array_equal(photograph.bgr, picked)
+            seen.add(name)
+            whole = picture(source / row["image_path"]).convert("RGB")
+            x1, y1, x2, y2 = box_of(row)
+            wide, high = 0.4 * (x2 - x1), 0.4 * (y2 - y1)
+            place = (max(x1 - wide, 0), max(y1 - high, 0), min(x2 + wide, 64), min(y2 + high, 64))
+            expected = np.asarray(whole.resize((64, 64), Image.Resampling.BILINEAR, place), int)[..., ::-1]
+            assert np.abs(picked - expected).max() <= 1
+    assert seen == set(rows)
+
+
+@pytest.mark.parametrize("landmarks", ["exact", "detected"])
+def test_coco_annotations(source, rows, tmp_path, landmarks):
+    """What pycocotools takes them for is in test_export_readers.py, which is slow."""
+    missing = "fail" if landmarks == "exact" else "skip"
+    export_dataset(source, "coco", tmp_path / "out", ExportOptions(landmarks, missing))
+    numbers = []
+    for split in ("train", "validation"):
+        read = json.loads((tmp_path / "out" / "annotations" / f"{split}.json").read_text())
+        [category] = read["categories"]
+        assert (category["id"], category["name"], len(category["keypoints"])) == (1, "face", 68)
+        assert category["skeleton"][:2] == [[1, 2], [2, 3]], "COCO counts from 1"
+        assert np.ptp(category["skeleton"]) == 67
+        assert (
+            len({licence["id"] for licence in read["licenses"]} | {i["license"] for i in read["images"]}) == 1
+        )
+        images = {image["id"]: image for image in read["images"]}
+        for annotation in read["annotations"]:
+            assert annotation["id"] == annotation["image_id"]
+            image = images.pop(annotation["image_id"])
+            numbers.append(annotation["id"])
+            row = rows[image["file_name"].removesuffix(".png")]
+            assert (row["split"], image["width"], image["height"]) == (split, 64, 64)
+            shown = (tmp_path / "out" / "images" / split / image["file_name"]).read_bytes()
+            assert shown == (source / row["image_path"]).read_bytes()
+            assert (annotation["category_id"], annotation["iscrowd"]) == (1, 0)
+            assert annotation["num_keypoints"] == 68
+            points = np.array(annotation["keypoints"]).reshape(68, 3)
+            visible = np.array(row["landmarks_visible"])[IBUG_68]
+            flags = np.where(visible, 2, 1) if landmarks == "exact" else np.full(68, 2)
+            np.testing.assert_array_equal(points[:, 2], flags)
+            low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+            np.testing.assert_allclose(annotation["bbox"], [*low, *(high - low)])
+            assert annotation["area"] == pytest.approx(np.prod(high - low))
+        assert not images
+    assert numbers == list(range(1, (36 if landmarks == "exact" else 32) + 1))
+
+
+FRAME = np.pad(np.zeros((62, 62, 3), np.uint8), ((1, 1), (1, 1), (0, 0)), constant_values=255)
+"""An image with a white border, which is black inside."""
+
+
+@pytest.mark.parametrize(
+    ("box", "white"),
+    [
+        (None, "lrtb"),
+        ((0, 0, 64, 64), "lrtb"),
+        ((-20, -20, 84, 84), "lrtb"),
+        ((200, 0, 264, 64), "lrtb"),  # beyond the image: all of it
+        ((0, -300, 64, -200), "lrtb"),
+        ((14, 14, 49, 49), "lt"),  # 0.4 of its 35 pixels more on each side: 14
+        ((15, 15, 50, 50), "rb"),
+        ((20, 20, 44, 44), ""),
+        ((0, 20, 30, 44), "l"),
+        ((34, 20, 64, 44), "r"),
+        ((20, 0, 44, 30), "t"),
+        ((20, 34, 44, 64), "b"),
+        ((44, 0, 64, 14), "rt"),
+        ((0, 64.5, 64, 66), "lrtb"),  # a tenth of a pixel of it is in the image
+        ((64.5, 0, 66, 64), "lrtb"),
+    ],
+)
+def test_a_face_with_its_margin_ends_where_the_image_does(box, white):
+    file = io.BytesIO()
+    Image.fromarray(FRAME).save(file, "PNG")
+    sample = Sample(
+        "s", "s", "e", "train", np.zeros(3), np.eye(3), np.eye(3), np.zeros(3), 64, 64, True, None, "", None,
+        None if box is None else np.array(box, float), file.getvalue(), ".png",
+    )  # fmt: skip
+    found = cropped(sample)
+    assert found.shape == (64, 64, 3)
+    sides = {"l": found[32, 0], "r": found[32, -1], "t": found[0, 32], "b": found[-1, 32]}
+    assert {side for side, pixel in sides.items() if pixel.min() > 100} == set(white)
+    assert found[32, 32].max() == 0
+
+
 def read_biwi(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Angles (yaw, pitch, roll) as HopeNet's and FSA-Net's BIWI readers take them, and the translation."""
     lines = [[float(word) for word in line.split()] for line in path.read_text().splitlines() if line.strip()]
@@ -180,24 +293,81 @@ def read_biwi(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def test_biwi_as_its_readers_take_it(source, rows, tmp_path):
     export_dataset(source, "biwi", tmp_path / "out")
-    names = (tmp_path / "out" / "files.txt").read_text().split()
-    assert len(names) == 36 and names[0] == "01/frame_00001"
     seen = set()
-    for name in names:
-        angles, translation = read_biwi(tmp_path / "out" / f"{name}_pose.txt")
-        subject = {"01": "s1", "02": "s2"}[name[:2]]
-        yaw, pitch, roll = np.round(angles).astype(int)
-        row = rows[f"{subject}/neutral/y{yaw:+}_p{pitch:+}_r{roll:+}"]
-        np.testing.assert_allclose(angles, [row["yaw_deg"], row["pitch_deg"], row["roll_deg"]], atol=1e-9)
-        np.testing.assert_allclose(translation, row["translation_mm"])
-        derived = Rotation.from_euler("XYZ", [-angles[1], angles[0], angles[2]], degrees=True).as_matrix()
-        np.testing.assert_allclose(derived, rotation(row), atol=1e-10)
-        shown = np.asarray(picture(tmp_path / "out" / f"{name}_rgb.png"))
-        np.testing.assert_array_equal(shown, np.asarray(picture(source / row["image_path"])))
-        seen.add(row["sample_id"])
+    for split, number, subject in (("train", "01", "s1"), ("validation", "02", "s2")):
+        folder = tmp_path / "out" / split
+        names = (folder / "files.txt").read_text().split()
+        assert len(names) == 18 and names[0] == f"{number}/frame_00001"
+        assert [path.name for path in folder.iterdir() if path.is_dir()] == [number], "splits do not mix"
+        for name in names:
+            angles, translation = read_biwi(folder / f"{name}_pose.txt")
+            yaw, pitch, roll = np.round(angles).astype(int)
+            row = rows[f"{subject}/neutral/y{yaw:+}_p{pitch:+}_r{roll:+}"]
+            np.testing.assert_allclose(angles, [row["yaw_deg"], row["pitch_deg"], row["roll_deg"]], atol=1e-9)
+            np.testing.assert_allclose(translation, row["translation_mm"])
+            derived = Rotation.from_euler("XYZ", [-angles[1], angles[0], angles[2]], degrees=True).as_matrix()
+            np.testing.assert_allclose(derived, rotation(row), atol=1e-10)
+            shown = np.asarray(picture(folder / f"{name}_rgb.png"))
+            np.testing.assert_array_equal(shown, np.asarray(picture(source / row["image_path"])))
+            np.testing.assert_allclose(read_dockerface(folder, name), box_of(row), atol=1e-9)
+            seen.add(row["sample_id"])
     assert seen == set(rows)
-    k = np.loadtxt((tmp_path / "out" / "01" / "rgb.cal").read_text().splitlines()[:3])
+    k = np.loadtxt((tmp_path / "out" / "train" / "01" / "rgb.cal").read_text().splitlines()[:3])
     np.testing.assert_allclose(k.ravel(), row["camera"])
+
+
+def test_biwi_of_a_wide_image_whose_camera_looks_aside(tmp_path, build):
+    build(tmp_path / "d", camera=Camera(96, 64, 85.0, 700.0, principal_px=(40.0, 36.0)))
+    export_dataset(tmp_path / "d", "biwi", tmp_path / "out")
+    matrix, distortion, turned, moved, size = (
+        (tmp_path / "out" / "train" / "01" / "rgb.cal").read_text().split("\n\n")
+    )
+    k = np.array([row.split() for row in matrix.splitlines()], float)
+    assert k[:2, 2].tolist() == [40, 36] and k[0, 0] == k[1, 1] == pytest.approx(85 / 36 * 96)
+    assert [float(word) for word in turned.split()] == [1, 0, 0, 0, 1, 0, 0, 0, 1], "the depth camera is this"
+    assert (distortion, moved, size) == ("0 0 0 0", "0 0 0", "96 64\n")
+
+
+def read_dockerface(folder: Path, name: str) -> list[float]:
+    """The box as HopeNet finds it: words two to five of the first line of the file beside the image."""
+    home, frame = name.split("/")
+    words = (folder / f"{home}/dockerface-{frame}_rgb.txt").read_text().splitlines()[0].split(" ")
+    assert int(words[0]) == int(frame[-5:])
+    return [float(word) for word in words[1:5]]
+
+
+def box_of(row: dict) -> np.ndarray:
+    """The box of the face's exact landmarks in the image."""
+    mm = np.array(row["landmarks_exact"]).reshape(468, 3)[:467]  # the last one has no anchor
+    image = mm @ np.array(row["camera"]).reshape(3, 3).T
+    image = image[:, :2] / image[:, 2:]
+    return np.concatenate([image.min(axis=0), image.max(axis=0)])
+
+
+def test_boxes_without_exact_landmarks(tmp_path, build, monkeypatch):
+    """Those of the detector; and where it found nothing, an empty file, by which HopeNet takes all."""
+    import small_dataset
+
+    monkeypatch.setattr(small_dataset, "face_anchors", lambda: np.full((468, 3), np.nan))
+    heads = tuple(replace(head, anchor_absent=468) for head in small_dataset.HEADS)
+    build(tmp_path / "d", heads=heads)
+    export_dataset(tmp_path / "d", "biwi", tmp_path / "out")
+    rows = pq.read_table(tmp_path / "d" / "data").to_pylist()
+    by_angles = {(r["subject"], r["yaw_deg"], r["pitch_deg"], r["roll_deg"]): r for r in rows}
+    empty = 0
+    for split, subject in (("train", "s1"), ("validation", "s2")):
+        folder = tmp_path / "out" / split
+        for name in (folder / "files.txt").read_text().split():
+            row = by_angles[(subject, *np.round(read_biwi(folder / f"{name}_pose.txt")[0]).tolist())]
+            if row["detected"]:
+                points = np.array(row["landmarks"]).reshape(468, 3)[:, :2]
+                expected = [*points.min(axis=0), *points.max(axis=0)]
+                np.testing.assert_allclose(read_dockerface(folder, name), expected, atol=1e-5)
+            else:
+                home, frame = name.split("/")
+                empty += (folder / home / f"dockerface-{frame}_rgb.txt").read_text() == ""
+    assert empty == 4
+    assert "4 of 36" in (tmp_path / "out" / "README.md").read_text()
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -216,6 +386,105 @@ def test_images_come_from_the_table_where_they_are_embedded(tmp_path, build):
     build(tmp_path / "d", "embedded")
     export_dataset(tmp_path / "d", "biwi", tmp_path / "out")
     row = pq.read_table(tmp_path / "d" / "data").to_pylist()[0]
-    written = (tmp_path / "out" / "01" / "frame_00001_rgb.png").read_bytes()
+    written = (tmp_path / "out" / "train" / "01" / "frame_00001_rgb.png").read_bytes()
     assert written == row["image"]["bytes"]
     assert Image.open(io.BytesIO(written)).size == (64, 64)
+
+
+def test_what_identities_are_is_written_beside_numbers(source, tmp_path):
+    export_dataset(source, "biwi", tmp_path / "out")
+    assert (tmp_path / "out" / "identities.csv").read_text().splitlines() == [
+        "id,subject,expression,split,license,redistributable",
+        "1,s1,neutral,train,CC0-1.0,True",
+        "2,s2,neutral,validation,CC0-1.0,True",
+    ]
+
+
+FIELDS = {
+    "sample_id": ("sc:Text", "string"),
+    "image": ("sc:ImageObject", "image"),
+    "detected": ("sc:Boolean", "bool"),
+    "width": ("sc:Integer", "int32"),
+    "yaw_deg": ("sc:Float", "float64"),
+    "rotation": (["sc:Float"], ["float64", 9]),
+    "landmarks": (["sc:Float"], ["float32", 1404]),
+    "landmarks_visible": (["sc:Boolean"], ["bool", 468]),
+}
+"""What the types of some columns are in Croissant and on the hub; in a list: those of its elements."""
+
+
+def test_the_catalogues_say_what_columns_are(source, tmp_path):
+    """Their own readers are in test_export_readers.py, which is slow."""
+    yaml = pytest.importorskip("yaml")
+    export_dataset(source, "croissant", tmp_path / "out")
+    described = json.loads((tmp_path / "out" / "croissant.json").read_text())
+    assert described["license"] == ["https://creativecommons.org/publicdomain/zero/1.0/"]
+    assert described["citeAs"] == "A. Person | 2020"
+    assert "2 of the heads may be published" in described["description"]
+    fields = {field["name"]: field for field in described["recordSet"][0]["field"]}
+    schema = pq.read_schema(next((tmp_path / "out" / "data" / "train").iterdir()))
+    assert list(fields) == schema.names
+    front = yaml.safe_load((tmp_path / "out" / "README.md").read_text().split("---")[1])
+    assert (front["license"], front["size_categories"]) == ("cc0-1.0", ["n<1K"])
+    assert "license_name" not in front
+    assert "found the face in 88.9% of the rows" in (tmp_path / "out" / "README.md").read_text()
+    [info] = front["dataset_info"]
+    assert [(one["name"], one["num_examples"]) for one in info["splits"]] == [
+        ("train", 18),
+        ("validation", 18),
+    ]
+    features = {feature.pop("name"): feature for feature in info["features"]}
+    assert list(features) == schema.names
+    stored = json.loads(schema.metadata[b"huggingface"])["info"]["features"]
+    for name, (croissant, hub) in FIELDS.items():
+        several = isinstance(croissant, list)
+        assert fields[name]["dataType"] == (croissant[0] if several else croissant)
+        assert fields[name].get("repeated", False) == several
+        assert ("transform" in fields[name]["source"]) == (name == "image")
+        assert features[name] == ({"sequence": hub[0], "length": hub[1]} if several else {"dtype": hub})
+        value = {"dtype": hub[0] if several else hub, "_type": "Value"}
+        one = {"feature": value, "length": hub[1], "_type": "Sequence"} if several else value
+        assert stored[name] == ({"_type": "Image"} if name == "image" else one)
+
+
+@pytest.mark.parametrize(
+    ("rows", "category"),
+    [
+        *((1, "n<1K"), (999, "n<1K"), (1_000, "1K<n<10K"), (9_999, "1K<n<10K"), (10_000, "10K<n<100K")),
+        *((99_999, "10K<n<100K"), (100_000, "100K<n<1M"), (999_999, "100K<n<1M"), (1_000_000, "n>1M")),
+    ],
+)
+def test_the_size_as_the_hub_says_it(rows, category):
+    assert size_category(rows) == category
+
+
+def test_several_licences_are_other_and_each_is_named_in_the_catalogue(tmp_path, build):
+    from small_dataset import HEADS
+
+    names = ("CC-BY-4.0", "MIT", "urn:mine", "https://example.org/licence")
+    heads = tuple(replace(HEADS[0], subject=f"p{k}", license=name) for k, name in enumerate(names))
+    build(tmp_path / "d", "none", heads=heads)
+    export_dataset(tmp_path / "d", "croissant", tmp_path / "out")
+    described = json.loads((tmp_path / "out" / "croissant.json").read_text())
+    assert described["license"] == [
+        "https://creativecommons.org/licenses/by/4.0/",
+        "MIT",
+        "https://example.org/licence",
+        "see README.md (urn:mine)",
+    ]
+    text = (tmp_path / "out" / "README.md").read_text()
+    assert "license: other\nlicense_name: of-each-head-see-the-card" in text
+
+
+def test_the_table_says_what_was_exported(source, tmp_path):
+    export_dataset(source, "coco", tmp_path / "out", ExportOptions("detected", "skip"))
+    lines = (tmp_path / "out" / "README.md").read_text().split("## Format")[0].splitlines()
+    facts = [[cell.strip() for cell in line.split("|")[1:3]] for line in lines if line.startswith("|")][2:]
+    assert facts[:6] == [
+        ["format", "coco"],
+        ["rows", "32 of 36"],
+        ["landmarks", "detected"],
+        ["rows left out", "4, for lack of a detection or landmarks"],
+        ["heads", "2 of 2"],
+        ["rows without landmarks", "left out"],
+    ]

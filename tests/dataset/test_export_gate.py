@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from dataclasses import replace
@@ -16,9 +17,12 @@ import pytest
 from small_dataset import HEADS
 
 from generator import cli
+from generator.dataset.export.licence import Withheld, check_licences
 from generator.dataset.export.options import OVERRIDE, ExportOptions
 from generator.dataset.export.run import export_dataset
+from generator.dataset.format.manifest import read_manifest
 from generator.errors import DatasetError, HeadturnError, UsageError
+from generator.plan.poses import grid_plan
 from generator.registries import FORMATS
 from generator.sealed import sealed
 
@@ -69,8 +73,10 @@ def test_only_redistributable_leaves_the_others_out_of_every_file(mixed, tmp_pat
     assert (done.rows, done.heads, done.withheld) == (18, 1, 18)
     for path in (tmp_path / "out").rglob("*"):
         assert "s2" not in path.name
-        if path.suffix in (".txt", ".json", ".csv", ".md"):
+        if path.suffix in (".txt", ".json", ".jsonl", ".yaml", ".csv", ".md"):
             assert "s2" not in path.read_text() and "FaceScape" not in path.read_text()
+        if path.suffix in (".tar", ".tfrecord"):
+            assert not re.search(rb"\bs2\b|FaceScape", path.read_bytes())
     for path in (tmp_path / "out").rglob("*.parquet"):
         assert set(pq.read_table(path)["subject"].to_pylist()) == {"s1"}
     assert "Only heads whose images may be published" in (tmp_path / "out" / "README.md").read_text()
@@ -86,9 +92,14 @@ def test_rows_are_left_out_of_parts_that_hold_several_heads(mixed, tmp_path):
     assert export_dataset(tmp_path / "d", "huggingface", tmp_path / "out", options).rows == 18
 
 
-def test_the_override_is_written_on_the_card(mixed, tmp_path):
+def test_the_override_is_written_on_the_card(mixed, dataset, tmp_path):
+    for root, options in ((mixed, ExportOptions()), (dataset, ExportOptions(may_publish=True))):
+        export_dataset(root, "6drepnet", tmp_path / root.parent.name, options)
+        assert OVERRIDE not in (tmp_path / root.parent.name / "README.md").read_text(), (
+            "and where it was needed"
+        )
     done = export_dataset(mixed, "huggingface", tmp_path / "out", ExportOptions(may_publish=True))
-    assert done.rows == 36
+    assert (done.rows, done.heads, done.withheld) == (36, 2, 0)
     card = (tmp_path / "out" / "README.md").read_text()
     assert OVERRIDE in card and "Do not publish" in card and "FaceScape" in card
 
@@ -102,6 +113,23 @@ def test_a_refusal_names_a_few_subjects_and_counts_the_rest(tmp_path, build):
             says=("8 of 8 subjects", "p0, p1, p2, p3, p4 and 3 more"))  # fmt: skip
     options = ExportOptions(only_redistributable=True)
     refused(UsageError, tmp_path / "d", "huggingface", tmp_path / "out", options, says=("leaves nothing",))
+
+
+@pytest.mark.parametrize(
+    ("count", "names"), [(2, "p0, p1"), (5, "p0, p1, p2, p3, p4"), (6, "p0, p1, p2, p3, p4 and 1 more")]
+)
+def test_five_names_and_how_many_more(count, names):
+    assert Withheld(tuple(f"p{k}" for k in range(count)), 0).names == names
+
+
+@pytest.mark.parametrize(("of_heads", "of_rows"), [(False, True), (True, False)])
+def test_either_heads_or_rows_may_forbid_all(tmp_path, build, of_heads, of_rows):
+    root = tmp_path / "d"
+    build(root, "none", heads=tuple(replace(h, redistributable=of_rows and h is HEADS[1]) for h in HEADS))
+    heads = [replace(head, redistributable=of_heads) for head in HEADS]
+    options = ExportOptions(only_redistributable=True)
+    with pytest.raises(UsageError, match="leaves nothing"):
+        check_licences(root, read_manifest(root), heads, options, True)
 
 
 def test_a_target_that_is_not_empty_a_file_or_inside_is_refused(dataset, tmp_path):
@@ -147,7 +175,7 @@ def test_a_dataset_of_another_major_version(dataset, tmp_path):
 @pytest.mark.parametrize("name", FORMATS)
 def test_without_images(tmp_path, build, name):
     build(tmp_path / "d", "none")
-    if name in ("nlml-hpe", "300w-lp", "biwi", "coco"):
+    if name in ("nlml-hpe", "300w-lp", "fsanet-npz", "biwi", "coco", "yolo-pose", "webdataset", "tfrecord"):
         refused(DatasetError, tmp_path / "d", name, tmp_path / "out", says=("images = none", name))
         return
     export_dataset(tmp_path / "d", name, tmp_path / "out")
@@ -159,13 +187,11 @@ def test_without_images(tmp_path, build, name):
 
 
 def test_poses_that_are_not_whole_degrees_have_no_name_in_nlml_hpe(tmp_path, build):
-    from generator.plan.poses import grid_plan
-
     build(tmp_path / "d", plan=grid_plan((-2.5, 2.5, 2.5), (0, 0, 1), (0, 0, 1)))
     refused(UsageError, tmp_path / "d", "nlml-hpe", tmp_path / "out", says=("whole degrees",))
 
 
-@pytest.mark.parametrize("name", ["300w-lp", "coco"])
+@pytest.mark.parametrize("name", ["300w-lp", "coco", "yolo-pose"])
 def test_rows_without_landmarks_are_a_choice_never_zeros(dataset, tmp_path, name):
     def export(target, **options):
         return export_dataset(dataset, name, tmp_path / target, ExportOptions(**options))
@@ -187,7 +213,7 @@ def test_rows_without_landmarks_are_a_choice_never_zeros(dataset, tmp_path, name
     assert "4 rows filled with exact ones" in (tmp_path / "c" / "README.md").read_text()
 
 
-@pytest.mark.parametrize("name", ["nlml-hpe", "6drepnet", "biwi", "huggingface", "croissant"])
+@pytest.mark.parametrize("name", ["nlml-hpe", "6drepnet", "fsanet-npz", "biwi", "huggingface", "croissant"])
 def test_rows_without_a_detection_in_formats_without_need_of_one(dataset, tmp_path, name):
     refused(UsageError, dataset, name, tmp_path / "a", ExportOptions(missing="fail"),
             says=("no face was found",))  # fmt: skip
@@ -195,6 +221,26 @@ def test_rows_without_a_detection_in_formats_without_need_of_one(dataset, tmp_pa
     assert (done.rows, done.left_out) == (32, 4)
     for path in (tmp_path / "b" / "data").rglob("*.parquet"):
         assert pq.read_table(path)["detected"].to_pylist().count(False) == 0
+
+
+def test_an_image_format_that_is_none_of_the_formats(dataset, tmp_path):
+    refused(UsageError, dataset, "nlml-hpe", tmp_path / "a", ExportOptions(image_format="bmp"),
+            says=("--image-format bmp", "takes one of jpg, png"))  # fmt: skip
+    refused(UsageError, dataset, "biwi", tmp_path / "a", ExportOptions(image_format="jpg"),
+            says=("--image-format jpg", "biwi has no choice of it"))  # fmt: skip
+
+
+def test_landmarks_that_are_no_choice(dataset, tmp_path):
+    refused(UsageError, dataset, "coco", tmp_path / "a", ExportOptions(landmarks="best"),
+            says=("--landmarks 'best': expected one of auto, exact, detected",))  # fmt: skip
+
+
+def test_an_export_without_a_row_is_none(tmp_path, build):
+    """Also of formats with boxes, which asked for the points of no rows and ended in a traceback."""
+    build(tmp_path / "d", plan=grid_plan((30, 30, 1), (20, 20, 1), (0, 10, 10)))  # none of them is detected
+    for name, landmarks in (("coco", "detected"), ("huggingface", "auto"), ("biwi", "auto")):
+        refused(UsageError, tmp_path / "d", name, tmp_path / "a", ExportOptions(landmarks, "skip"),
+                says=("no row is left to export",))  # fmt: skip
 
 
 def test_heads_without_anchors(tmp_path, build, monkeypatch):
@@ -237,6 +283,8 @@ def test_the_command(dataset, tmp_path, monkeypatch, capsys):
     assert json.loads(capsys.readouterr().out)["rows"] == 36
     assert headturn("export", dataset, "--format", "coco", "--out", out) == 2
     assert "not empty" in capsys.readouterr().err
+    assert headturn("export", dataset, "--format", "6drepnet", "--out", tmp_path / "six") == 0
+    assert "6DRepNet's own code reads 300w-lp and fsanet-npz" in capsys.readouterr().out
     assert headturn("export", dataset, "--format", "tape", "--out", out) == 2
     assert headturn("export", tmp_path / "nowhere", "--format", "coco", "--out", tmp_path / "o") == 1
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("headturn: ")]

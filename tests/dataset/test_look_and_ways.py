@@ -6,14 +6,17 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_verify import PART, failures, rewrite
 
-from generator.dataset.format.anchors_table import HeadAnchors
-from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.anchors_table import HeadAnchors, read_anchors
+from generator.dataset.format.heads_table import IDENTITY, read_heads
 from generator.dataset.format.part import read_part
 from generator.dataset.proof.exact_checks import levelling_problems
 from generator.dataset.proof.verify import verify_dataset
+from generator.geometry.rotation import graphics_rotation, rotation_from_angles
+from generator.landmarks.facing import facing
 from generator.landmarks.shared import packaged
 from generator.landmarks.topology import FACE_MESH
 
@@ -60,3 +63,43 @@ def test_anchors_that_are_not_the_package_s_do_not_pass_for_them(dataset: Path) 
     assert problems(ours.anchors.weights) == []
     [said] = problems(ours.anchors.weights[:, [1, 0, 2]])
     assert said == f"anchors.parquet: {'/'.join(name)}: not the anchors of the package"
+
+
+def test_a_correction_is_held_against_the_anchors_before_it(dataset: Path) -> None:
+    """Those of a levelled head were turned by it; where the mesh's own pose stays, they were not."""
+    aside = rotation_from_angles(np.array([40.0, 0, 0]))
+    own = packaged(FACE_MESH)[0].anchors.points @ aside.T
+    fit = facing(own, FACE_MESH)
+    assert fit is not None
+    correction = graphics_rotation(fit.T)
+    first = replace(
+        read_heads(dataset)[0],
+        correction=tuple(correction.ravel().tolist()),
+        correction_sd_deg=(1.0, 1.0, 1.0),
+    )
+    for frame, points, right in (
+        ("source", own, True),
+        ("source", own @ graphics_rotation(correction).T, False),
+        ("level", own @ graphics_rotation(correction).T, True),
+        ("level", own, False),
+    ):
+        anchors = HeadAnchors("s1", "neutral", np.arange(468), np.ones((468, 3)), points)
+        found = list(
+            levelling_problems([replace(first, frame=frame)], {("s1", "neutral"): anchors}, FACE_MESH)
+        )
+        assert ["degrees from what its anchors say" in problem for problem in found] == [True] * (not right)
+
+
+def test_a_subject_has_one_correction_and_it_is_that_of_its_anchors(dataset: Path) -> None:
+    anchors = read_anchors(dataset)
+    first = replace(read_heads(dataset)[0], correction=IDENTITY)
+    turned = (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    for other, said in (
+        (replace(first, expression="smile", correction=turned), "s1 has more than one correction"),
+        (replace(first, expression="smile", frame="levelled"), "s1 has more than one correction"),
+        (replace(first, subject="s2", correction=turned), ""),
+    ):
+        found = list(levelling_problems([first, other], anchors, FACE_MESH))
+        assert [problem for problem in found if "one correction" in problem] == (
+            [f"heads.parquet: {said}"] if said else []
+        )

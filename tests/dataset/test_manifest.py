@@ -95,6 +95,13 @@ def test_no_manifest_means_not_finished(tmp_path):
         read_manifest(tmp_path)
 
 
+def test_a_part_of_a_dataset_and_a_file_are_told_from_no_dataset(dataset):
+    with pytest.raises(DatasetError, match=r"data: a part of a dataset; give all of it, .*"):
+        read_manifest(dataset / "data")
+    with pytest.raises(DatasetError, match=r"README\.md: a file; give the folder"):
+        read_manifest(dataset / "README.md")
+
+
 def test_portable_command():
     arguments = ["headturn", "build", "/home/a b/c.toml", "--out=/data/x", r"C:\heads", "--workers", "2"]
     assert portable_command(arguments) == "headturn build c.toml --out=x heads --workers 2"

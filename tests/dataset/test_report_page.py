@@ -54,6 +54,7 @@ addEventListener("load", () => {
   seen.badges = [...document.querySelectorAll(".badge")].map((b) => b.textContent);
   seen.tiles = document.querySelectorAll(".tile img").length;
   seen.licence = document.querySelectorAll(".head p")[7].textContent;
+  seen.choices = ["detector", "pick"].filter((id) => $(id).offsetParent);
   seen.wide = document.documentElement.scrollWidth; seen.window = innerWidth;
   const out = document.createElement("pre"); out.id = "probe";
   out.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(seen)))); document.body.append(out);
@@ -96,6 +97,7 @@ def test_what_a_browser_shows_is_what_the_table_says(known, chromium, tmp_path, 
     seen = json.loads(base64.b64decode(probe.group(1)))
     assert seen["ready"] == "yes"
     assert seen["wide"] <= seen["window"] == width  # nothing sticks out
+    assert seen["choices"] == ["pick"], "one detector is no choice"
 
     table = pq.read_table(known / "data").to_pylist()
     yaws, pitches = (-30, -15, 0, 15, 30), (-20, 0, 20)

@@ -23,7 +23,7 @@ from generator.dataset.format.part import check_part, read_part
 from generator.dataset.proof.verify import VerifyReport, verify_dataset
 from generator.errors import DatasetError
 from generator.geometry.camera import Camera
-from generator.plan.poses import sobol_plan
+from generator.plan.poses import grid_plan, sobol_plan
 
 PART = "data/train/part-s1-0.parquet"
 
@@ -121,6 +121,13 @@ def test_poses_off_the_grid(build, tmp_path):
     assert sum(cell.rows for cell in report.cells) == 80
 
 
+def test_images_that_are_not_square(build, tmp_path):
+    camera = Camera(96, 64, 85.0, 700.0)
+    build(tmp_path / "d", camera=camera, render={"aspect": 1.5})
+    report = verify_dataset(tmp_path / "d")
+    assert report.ok, report.text()
+
+
 def test_a_deleted_part(dataset):
     (dataset / PART).unlink()
     problems = failures(verify_dataset(dataset))
@@ -154,7 +161,9 @@ def test_a_flipped_bit_anywhere(dataset, place):
 @pytest.mark.parametrize("keep", [0, 3, 4000, -9])
 def test_a_truncated_part(dataset, keep):
     (dataset / PART).write_bytes((dataset / PART).read_bytes()[:keep])
-    problems = failures(verify_dataset(dataset))
+    report = verify_dataset(dataset)
+    assert (report.rows, report.detected_rows) == (26, 22)
+    problems = failures(report)
     assert "SHA-256 differs" in problems["part hashes"] and "not a readable part" in problems["part hashes"]
     assert "and 7 more" in problems["every row once"]
 
@@ -210,6 +219,35 @@ def test_a_matrix_off_by_more_than_1e_12(dataset):
     assert set(failures(verify_dataset(dataset))) == {"rotation"}
 
 
+@pytest.mark.parametrize(("pitch", "either"), [(180, True), (170, False)])
+def test_a_turn_back_is_another_rotation_unless_it_is_half_a_turn(build, tmp_path, pitch, either):
+    build(tmp_path / "d", "none", plan=grid_plan((0, 0, 1), (pitch, pitch, 1), (0, 0, 1)))
+    rows = read_part(tmp_path / "d" / PART)["quaternion"].to_pylist()
+    values = [[w, -x, -y, -z] for w, x, y, z in rows]
+    rewrite(tmp_path / "d", {"quaternion": values}, honest=True)
+    assert ("rotation" in failures(verify_dataset(tmp_path / "d"))) != either
+    rewrite(tmp_path / "d", {"quaternion": [[-value for value in row] for row in rows]}, honest=True)
+    assert "quaternion does not agree" in failures(verify_dataset(tmp_path / "d"))["rotation"], (
+        "w is not below 0"
+    )
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("image_path", "images/s1/neutral/y-30_p-20_r+0.png", "although images = none"),
+        ("image_sha256", "0" * 63, "the image is not the one that was rendered"),
+        ("image_sha256", "0" * 64, ""),
+    ],
+)
+def test_what_rows_say_of_images_that_were_not_kept(build, tmp_path, column, value, said):
+    build(tmp_path / "d", "none")
+    values = read_part(tmp_path / "d" / PART)[column].to_pylist()
+    rewrite(tmp_path / "d", {column: [value, *values[1:]]}, honest=True)
+    found = failures(verify_dataset(tmp_path / "d"))
+    assert said in found["images"] if said else "images" not in found
+
+
 def test_doubled_rows(dataset):
     shutil.copy(dataset / PART, dataset / "data/train/part-copy.parquet")
     assert failures(verify_dataset(dataset)) == {
@@ -221,6 +259,28 @@ def test_doubled_rows(dataset):
     problems = failures(verify_dataset(dataset))
     assert set(problems) == {"every row once"}
     assert "y-30_p-20_r+0 is there more than once" in problems["every row once"]
+
+
+@pytest.mark.parametrize(("column", "value"), [("subject", "s2"), ("expression", "smile")])
+def test_a_part_of_another_head_than_the_manifest_says(dataset, column, value):
+    manifest = read_manifest(dataset)
+    parts = tuple(replace(p, **{column: value}) if p.path == PART else p for p in manifest.parts)
+    write_manifest(replace(manifest, parts=parts), dataset)
+    quick = failures(verify_dataset(dataset, quick=True))
+    assert quick == {"part files": f"{PART} is not of {value}, as the manifest says"}
+    said = "s2/neutral" if column == "subject" else "s1/smile"
+    assert failures(verify_dataset(dataset)) == {
+        "part hashes": f"{PART} is not of {said}, as the manifest says"
+    }
+
+
+@pytest.mark.parametrize("change", [{"rows": 9}, {"detected": 7}])
+def test_a_part_with_other_counts_than_the_manifest_says(dataset, change):
+    manifest = read_manifest(dataset)
+    parts = tuple(replace(p, **change) if p.path == PART else p for p in manifest.parts)
+    write_manifest(replace(manifest, parts=parts), dataset)
+    found = failures(verify_dataset(dataset))
+    assert f"{PART} has 10 rows, the manifest says {change.get('rows', 10)}" in found["part hashes"]
 
 
 def test_leftovers_of_a_killed_build(dataset):

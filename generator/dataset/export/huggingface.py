@@ -50,7 +50,7 @@ def card(source: Source, rows: Mapping[str, int], name: str) -> str:
     """README.md with the front matter of the hub. rows: of each split."""
     schema = exported_schema(source)
     columns = column_rows(ROWS.values(), source.topology, lambda column: column.name in schema.names)
-    rate = sum(p.detected for p in source.parts) / max(1, sum(p.rows for p in source.parts))
+    rate = sum(p.detected for p in source.parts) / sum(p.rows for p in source.parts)
     summary = (
         f"Images of {len(source.heads)} heads with exact head pose: {source.rows} rows, rendered in Blender "
         f"at poses that are known, not measured. A detector found the face in {rate:.1%} of the rows read; "
@@ -69,17 +69,21 @@ def card(source: Source, rows: Mapping[str, int], name: str) -> str:
     return "\n\n".join(sections) + "\n"
 
 
+def size_category(rows: int) -> str:
+    """What the hub calls a dataset of so many rows."""
+    return next((text for limit, text in _SIZES if rows < limit), "n>1M")
+
+
 def _front_matter(source: Source, rows: Mapping[str, int], schema: pa.Schema) -> str:
     licences = {head.license for head in source.heads}
     only = licences.pop() if len(licences) == 1 else ""
-    size = next((text for limit, text in _SIZES if source.rows < limit), "n>1M")
     lines = ["---", "pretty_name: Head poses", f"license: {_HUB_LICENCES.get(only, 'other')}"]
     if only not in _HUB_LICENCES:
         lines.append("license_name: of-each-head-see-the-card")
     lines += [
         "task_categories: [keypoint-detection]",
         "tags: [head-pose-estimation, face-landmarks, synthetic]",
-        f"size_categories: [{size}]",
+        f"size_categories: [{size_category(source.rows)}]",
         "configs:",
         "- config_name: default",
         "  default: true",

@@ -11,9 +11,11 @@ from generator.dataset.export.source import Source, require_images
 from generator.errors import UsageError
 
 ABOUT = """\
-`<id>/ID<id>_(<yaw>_<pitch>_<roll>).jpg`, whole degrees, as the published code of NLML-HPE looks for
-them; `identities.csv` says which head each id is. The code sorts the folders as numbers, so ids are
-numbers: the subject's own where all subjects are numbers with one expression each, else counted from 1.
+`<split>/<id>/ID<id>_(<yaw>_<pitch>_<roll>).{suffix}`, whole degrees, as the published code of NLML-HPE looks
+for them: a folder a split, with images alone in it, since that code takes every name in it for the number of
+a head. Give `train` to `trainset_path` and `validation` to `valset_path`. `identities.csv` says which head
+each id is: the subject's own number where all subjects are numbers with one expression each, else counted
+from 1.
 
 The pose in a name is R_C = Rx(-pitch) Ry(yaw) Rz(roll) in the camera frame. There are no landmarks here:
 the code runs its own detector, so an image on which ours found no face has an exact label all the same.
@@ -26,6 +28,7 @@ def write(source: Source, folder: Path) -> str:
     Raises UsageError: a pose is not in whole degrees. DatasetError: there are no images.
     """
     require_images(source, "nlml-hpe")
+    assert source.image_format is not None
     numbers = head_numbers(source.heads, keep_numbers=True)
     for sample in source.samples():
         angles = sample.angles_deg.tolist()
@@ -36,17 +39,19 @@ def write(source: Source, folder: Path) -> str:
             )
         number = numbers[sample.head]
         yaw, pitch, roll = (int(angle) for angle in angles)
-        path = folder / str(number) / f"ID{number}_({yaw}_{pitch}_{roll}).jpg"
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(sample.jpeg())
+        name = f"ID{number}_({yaw}_{pitch}_{roll}).{source.image_format}"
+        path = folder / sample.split / str(number) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(sample.encoded(source.image_format))
     write_identities(source.heads, numbers, folder)
-    return ABOUT
+    return ABOUT.format(suffix=source.image_format)
 
 
 FORMAT = Format(
     write,
     readers="the published code of NLML-HPE",
-    holds="`<id>/ID<id>_(<yaw>_<pitch>_<roll>).jpg`",
+    holds="`<split>/<id>/ID<id>_(<yaw>_<pitch>_<roll>).jpg` or `.png`",
     written="(yaw, pitch, roll) in the file name, whole degrees",
     back="Rx(-pitch) Ry(yaw) Rz(roll)",
+    image_formats=("jpg", "png"),
 )

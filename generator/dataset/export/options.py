@@ -20,6 +20,9 @@ LANDMARKS: tuple[Landmarks, ...] = get_args(Landmarks)
 
 OVERRIDE = "--i-may-publish-these-heads"
 
+ImageFormat = Literal["jpg", "png"]
+"""How an export writes its images, where its readers differ in what they look for."""
+
 NEEDS_POINTS: tuple[Missing, ...] = ("fail", "skip", "exact")
 """Choices of a format that is nothing without landmarks."""
 
@@ -34,7 +37,10 @@ class Format:
         rotation stands where) and back (how that gives R_C again).
     missing: the choices for rows without what the format needs; the first is the default.
     landmarks: does it hold any? They are the 68 points of iBUG. images: does it take images?
+    boxes: does it hold a box around the face, see :mod:`generator.dataset.export.boxes`?
+    image_formats: what --image-format may say; the first is the default. (): the format has one way.
     public: is it meant for publication?
+    note: one line for whoever may have meant another format.
     """
 
     write: Callable[[Source, Path], str]
@@ -45,12 +51,15 @@ class Format:
     missing: tuple[Missing, ...] = ("keep", "skip", "fail")
     landmarks: bool = False
     images: bool = True
+    boxes: bool = False
+    image_formats: tuple[ImageFormat, ...] = ()
     public: bool = False
+    note: str = ""
 
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """missing = None takes the format's own default.
+    """missing = None and image_format = None take the format's own default.
 
     public: the export will be published, whatever its format.
     only_redistributable: leave out rows that may not be published.
@@ -59,6 +68,7 @@ class ExportOptions:
 
     landmarks: Landmarks = "auto"
     missing: Missing | None = None
+    image_format: ImageFormat | None = None
     public: bool = False
     only_redistributable: bool = False
     may_publish: bool = False

@@ -67,6 +67,14 @@ def export_dataset(
     missing = options.missing or chosen.missing[0]
     if missing not in chosen.missing:
         raise UsageError(f"--missing {missing}: {name} takes one of {', '.join(chosen.missing)}")
+    image_format = options.image_format or next(iter(chosen.image_formats), None)
+    if image_format is not None and image_format not in chosen.image_formats:
+        takes = (
+            f"takes one of {', '.join(chosen.image_formats)}"
+            if chosen.image_formats
+            else "has no choice of it"
+        )
+        raise UsageError(f"--image-format {image_format}: {name} {takes}")
     public = options.public or chosen.public
     heads, kept_back = check_licences(root, manifest, read_heads(root), options, public)
     topology = dataset_topology(root, manifest)
@@ -84,6 +92,8 @@ def export_dataset(
         landmarks=_landmarks(root, heads, options.landmarks, topology) if chosen.landmarks else "",
         missing=missing,
         wants_images=chosen.images,
+        wants_boxes=chosen.boxes,
+        image_format=image_format,
         progress=progress or (lambda _: None),
     )
     with new_folder(target, root) as folder:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from generator.dataset.export.options import ImageFormat
 from generator.dataset.format.image import decode_image, image_format
 from generator.plan.poses import pose_name
 
@@ -25,6 +26,7 @@ class Sample:
                    pivot's depth where they come from the mesh
     points_from    "exact", "detected", or "" without points
     visible        bool [68] or None where nobody knows
+    box            float64 [4], x1 y1 x2 y2 in pixels around the face, or None where nobody knows
     image          the encoded file, b"" where the format takes none; image_suffix such as ".png"
     """
 
@@ -42,6 +44,7 @@ class Sample:
     points: np.ndarray | None
     points_from: str
     visible: np.ndarray | None
+    box: np.ndarray | None
     image: bytes
     image_suffix: str
 
@@ -55,6 +58,10 @@ class Sample:
         """The pose's name, such as "y+10_p-20_r+0"."""
         yaw, pitch, roll = self.angles_deg.tolist()
         return pose_name(yaw, pitch, roll)
+
+    def encoded(self, kind: ImageFormat) -> bytes:
+        """The image as kind. Raises DatasetError if it cannot be decoded."""
+        return self.png() if kind == "png" else self.jpeg()
 
     def jpeg(self) -> bytes:
         """The image as JPEG, its own bytes if it is one. Raises DatasetError if it cannot be decoded."""

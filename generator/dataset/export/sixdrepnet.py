@@ -18,6 +18,9 @@ Rz(roll) Ry(yaw) Rx(pitch), `ortho6d` float64 [N, 6] = the first two columns of 
 `compute_rotation_matrix_from_ortho6d` turns back into R, and `angles_deg` (yaw, pitch, roll).
 `labels_<split>.txt` has the same as text: image (or sample_id), then the nine numbers of R, row-major.
 
+No class of 6DRepNet's datasets.py reads this: it is for code of one's own. That repository itself reads
+`300w-lp`, which it trains on, and `fsanet-npz`.
+
 R is the transpose of R_U = D R_C D, D = diag(1, -1, -1). No landmarks, so a row on which no face was
 found has an exact label all the same.
 """
@@ -65,8 +68,9 @@ def get_r(rotation: np.ndarray) -> np.ndarray:
 
 FORMAT = Format(
     write,
-    readers="6D rotation losses",
+    readers="6D rotation losses in code of one's own",
     holds="`labels.npz` and text: get_R, its first two columns",
     written="`R` = Rz(roll) Ry(yaw) Rx(pitch)",
     back="D Rᵀ D",
+    note="6DRepNet's own code reads 300w-lp and fsanet-npz; this is for code of one's own",
 )

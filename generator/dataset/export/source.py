@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from generator.dataset.export.options import ExportOptions
+from generator.dataset.export.boxes import face_boxes
+from generator.dataset.export.options import ExportOptions, ImageFormat
 from generator.dataset.export.sample import Sample, suffix_of
 from generator.dataset.format.heads_table import HeadRow
 from generator.dataset.format.manifest import Manifest
@@ -37,7 +38,8 @@ class Source:
 
     topology: what the dataset's landmarks are. heads: those that are exported.
     landmarks: "exact", "detected", or "" for formats without any.
-    missing: one of the format's choices. wants_images: the format takes images.
+    missing: one of the format's choices. wants_images: the format takes images. wants_boxes: and boxes.
+    image_format: how they are written, where the format has a choice.
     progress: called with the number of rows read.
     rows, left_out: counted while the rows are read.
     """
@@ -50,6 +52,8 @@ class Source:
     landmarks: str
     missing: Missing
     wants_images: bool
+    wants_boxes: bool
+    image_format: ImageFormat | None
     progress: Callable[[int], None]
     rows: int = 0
     left_out: int = 0
@@ -115,7 +119,7 @@ class Source:
         UsageError: a row lacks its landmarks and missing = "fail".
         """
         columns = [*_TEXT, *_NUMBERS, *CAMERA, *(f"{angle}_deg" for angle in ANGLES)]
-        columns += _POINTS if self.landmarks else ()
+        columns += _POINTS if self.landmarks or self.wants_boxes else ()
         if self.has_images:
             columns += [*IMAGE_FACTS, *(["image"] if self.manifest.images == "embedded" else [])]
         for batch in self.batches(columns=columns):
@@ -128,6 +132,7 @@ class Source:
         cameras = RowCameras.of(batch)
         images = batch.select(IMAGE_FACTS).to_pylist() if self.has_images else None
         points, origin, visible = self._points(batch, cameras)
+        boxes = face_boxes(batch, cameras) if self.wants_boxes else [None] * len(batch)
         for k in range(len(batch)):
             if self.landmarks and not self._has_points(text["sample_id"][k], origin[k]):
                 continue
@@ -153,6 +158,7 @@ class Source:
                 points=points[k] if origin[k] else None,
                 points_from=origin[k],
                 visible=visible[k] if origin[k] and visible is not None else None,
+                box=boxes[k],
                 image=image,
                 image_suffix=suffix,
             )
@@ -180,9 +186,9 @@ class Source:
 
     def _has_points(self, name: str, origin: str) -> bool:
         """Count one row; False if it is to be left out."""
-        if origin:
+        if origin or self.missing == "keep":
             self.rows += 1
-            self.filled += origin != self.landmarks
+            self.filled += bool(origin) and origin != self.landmarks
             return True
         if self.missing == "skip":
             self.left_out += 1
