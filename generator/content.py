@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
 
-CONTENT_VERSION = 2
+CONTENT_VERSION = 3
 """Raise it when pixels or labels of a build change though its configuration does not; a release alone
 changes nothing. Units that were built by another content version are built again."""
 

@@ -8,7 +8,14 @@ from __future__ import annotations
 
 import errno
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import BinaryIO
+
+LOOK_S = 0.2
+"""Between two looks whether somebody else has done."""
 
 NO_LOCKS = {
     getattr(errno, name)
@@ -47,3 +54,18 @@ def try_lock(file: BinaryIO) -> bool:
             return False
         raise
     return True
+
+
+@contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """A block that one process at a time enters, others after it; where there are no locks, all at once.
+
+    path: of a file that is left behind. Raises OSError if it cannot be written.
+    """
+    with path.open("ab") as file:
+        try:
+            while not try_lock(file):
+                time.sleep(LOOK_S)
+        except NoLocks:
+            pass
+        yield

@@ -57,22 +57,41 @@ class ConvertOrder:
     target: str
 
 
+@dataclass(frozen=True)
+class SceneOrder:
+    """Open a .blend and write the surface of its head as a package, and what was noticed as JSON beside it.
+
+    head_object, shape_key: of :class:`generator.heads.head.Head`.
+    """
+
+    source: str
+    target: str
+    head_object: str
+    shape_key: str = ""
+
+
 # From a render worker.
 
 
 @dataclass(frozen=True)
 class WorkerReady:
-    """The first thing a worker says. version: of its Blender."""
+    """The first thing a worker says. version: of its Blender. device: its GPU; empty for the CPU."""
 
     version: str
+    device: str = ""
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """The image of one view lies at path."""
+    """The image of one view lies at path.
+
+    box: the pixels of the view that it holds, as first and last + 1 column and the same for rows, counted
+    from the bottom; None if it holds all.
+    """
 
     view: int
     path: str
+    box: tuple[int, int, int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -242,7 +261,7 @@ Receipt = Versions | Placed | Shared | Built
 _KINDS: dict[str, type] = {
     kind.__name__: kind
     for kind in (
-        *(RenderOrder, ConvertOrder, WorkerReady, Rendered, OrderDone, OrderFailed),
+        *(RenderOrder, ConvertOrder, SceneOrder, WorkerReady, Rendered, OrderDone, OrderFailed),
         *(VersionsOrder, PlaceOrder, ShareOrder, BuildOrder),
         *(LaneReady, Progressed, Versions, Placed, Shared, Built, LaneFailed),
     )

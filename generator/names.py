@@ -73,13 +73,16 @@ def as_inside_path(text: object) -> InsidePath:
     return InsidePath(text)
 
 
-def source_path_problem(text: str) -> str:
+def source_path_problem(text: str, *, above: bool = False) -> str:
     """What keeps text from being a file below a folder of heads, or "".
 
-    Files of heads may have names that no :data:`Name` has; but none is absolute, and none leaves the folder.
+    Files of heads may have names that no :data:`Name` has; but none is absolute, and none leaves the folder,
+    unless above says that it may lie beside or above that: a .blend names files anywhere.
     """
     pieces = text.replace("\\", "/").split("/")
-    if "\0" in text or ".." in pieces or "" in pieces or _DRIVE.match(text):
+    while above and len(pieces) > 1 and pieces[0] == "..":
+        del pieces[0]
+    if "\0" in text or ".." in pieces or "" in pieces or _DRIVE.match(pieces[0]):
         return "is no path inside the folder of the heads"
     return ""
 

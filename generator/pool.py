@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from generator.errors import WorkerError
 from generator.interpreter import python_command, python_environment
+from generator.platforms import HERE
 from generator.process import end_with_parent
 
 
@@ -67,7 +68,7 @@ class _Process:
             env=python_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for the one that started it
+            **HERE.own_group(),
         )
         self._prepare: Callable[[], None] | None = prepare
 

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 
+from generator.platforms import HERE
+
 _PR_SET_PDEATHSIG = 1
 MIB = 2**20
 
@@ -59,13 +61,7 @@ def limited_memory(mib: int) -> Iterator[None]:
 
 def is_running(pid: int) -> bool:
     """Is there a process with this id?"""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+    return HERE.is_running(pid)
 
 
 def available_cores() -> list[int]:

@@ -13,10 +13,14 @@ FORMATS: Registry[Any] = Registry(
         "nlml-hpe": "generator.dataset.export.nlml_hpe:FORMAT",
         "300w-lp": "generator.dataset.export.w300_lp:FORMAT",
         "6drepnet": "generator.dataset.export.sixdrepnet:FORMAT",
+        "fsanet-npz": "generator.dataset.export.fsanet_npz:FORMAT",
         "biwi": "generator.dataset.export.biwi:FORMAT",
         "huggingface": "generator.dataset.export.huggingface:FORMAT",
         "croissant": "generator.dataset.export.croissant:FORMAT",
         "coco": "generator.dataset.export.coco:FORMAT",
+        "yolo-pose": "generator.dataset.export.yolo_pose:FORMAT",
+        "webdataset": "generator.dataset.export.webdataset:FORMAT",
+        "tfrecord": "generator.dataset.export.tfrecord:FORMAT",
     },
 )
 """``headturn export --format``: a :class:`generator.dataset.export.options.Format`."""
@@ -61,6 +65,7 @@ Circumstances."""
 HEAD_FINDERS: Registry[Any] = Registry(
     "head source",
     {
+        "blend": "generator.heads.blend:FINDER",
         "facescape": "generator.heads.facescape:FINDER",
         "mesh": "generator.heads.folders:FINDER",
     },

@@ -3,6 +3,11 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
+from contextlib import suppress
+from pathlib import Path
+
 import bpy
 
 OLDEST = (4, 2, 0)
@@ -13,6 +18,21 @@ def check_version() -> str:
     if bpy.app.version < OLDEST:
         raise RuntimeError(f"Blender {bpy.app.version_string} is too old: Headturn needs 4.2 or newer")
     return ".".join(map(str, bpy.app.version))
+
+
+def write_exr_alone() -> None:
+    """Have OpenEXR write with the thread that asks for it, where that is possible.
+
+    Blender gives it a thread for every core there is, and it gives each row of an image to one of them: more
+    work than to write it, on cores that are other workers'. Nothing in Blender's Python says otherwise, so
+    the library is asked; one that is linked into the executable keeps its threads.
+    """
+    with suppress(OSError, AttributeError):
+        mapped = Path("/proc/self/maps").read_text(encoding="utf-8")
+        for library in set(re.findall(r"/.*/libOpenEXR[-.].*", mapped)):
+            known = Path(library).read_bytes()
+            for name in set(re.findall(rb"_ZN\d+Imf_\w+20setGlobalThreadCountEi", known)):
+                ctypes.CDLL(library)[name.decode()](0)
 
 
 def use_still_images(settings: bpy.types.ImageFormatSettings) -> None:

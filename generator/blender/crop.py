@@ -37,7 +37,8 @@ class Outline:
 
     def __init__(self, vertices: np.ndarray) -> None:
         points = vertices if len(vertices) <= EXACT else _cell_corners(vertices)
-        self._points = points @ CAMERA_FROM_GRAPHICS
+        # Of one number after another products and extremes are found sooner.
+        self._points = (points @ CAMERA_FROM_GRAPHICS).T.copy()
 
     def box(
         self, ypr_deg: Sequence[float], camera: Camera, offset_mm: Sequence[float] = (0.0, 0.0, 0.0)
@@ -47,14 +48,14 @@ class Outline:
         offset_mm: where it is moved before it turns, frame U.
         """
         rotation = rotation_from_angles(np.asarray(ypr_deg, dtype=np.float64))
-        moved = self._points + np.asarray(offset_mm) @ CAMERA_FROM_GRAPHICS
-        points = moved @ rotation.T + camera.translation_mm
+        moved = rotation @ (np.asarray(offset_mm) @ CAMERA_FROM_GRAPHICS) + camera.translation_mm
+        points = rotation @ self._points + moved[:, None]
         size = (camera.width, camera.height)
-        if points[:, 2].min() < 0.05 * camera.distance_mm:
+        if points[2].min() < 0.05 * camera.distance_mm:
             return 0, size[0], 0, size[1]  # part of it is beside the camera: there is no outline
-        pixels = camera.project(points)
-        low = np.clip(np.floor(pixels.min(axis=0)) - MARGIN, 0, size).astype(int).tolist()
-        high = np.clip(np.ceil(pixels.max(axis=0)) + MARGIN, 0, size).astype(int).tolist()
+        pixels = camera.project(points.T).T
+        low = np.clip(np.floor(pixels.min(axis=1)) - MARGIN, 0, size).astype(int).tolist()
+        high = np.clip(np.ceil(pixels.max(axis=1)) + MARGIN, 0, size).astype(int).tolist()
         if low[0] >= high[0] or low[1] >= high[1]:
             return None
         return low[0], high[0], size[1] - high[1], size[1] - low[1]

@@ -6,18 +6,19 @@ No ray is traced beyond the first hit, so the image has no noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
 import bpy
 
 from generator.blender.lamps import key_direction, key_strengths
-from generator.blender.light_maps import AMBIENT, DIRECT, FACING
+from generator.blender.light_maps import ALL, AMBIENT, FACING, layout_of
 from generator.blender.map_nodes import Lit, MapNodes, place_in
 from generator.blender.needs import Needs
 from generator.blender.nodes import apart, math_node, scaled, vector_node
-from generator.heads.shine import Kind
+from generator.heads.mesh import HeadMesh, Material
+from generator.heads.shine import Kind, Kinds, kind_of_gloss
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 
@@ -39,26 +40,40 @@ class FastLight:
 
     def __init__(self, needs: Needs) -> None:
         self.needs = needs
-        self._glossy: dict[bool, bpy.types.NodeTree] = {}
+        self._groups: dict[tuple[bool, bool], bpy.types.NodeTree] = {}
         self._key: bpy.types.NodeTree | None = None
 
     @cached_property
     def _maps(self) -> MapNodes:
         return MapNodes()
 
-    def into(self, tree: bpy.types.NodeTree, normal: bpy.types.NodeSocket | None, gloss: Kind) -> Sent:
+    def kinds(self, materials: Sequence[Material]) -> Kinds:
+        """Those of the gloss that they have in some look."""
+        every = dict.fromkeys(self._kind(material) for material in materials)
+        return tuple(kind for kind in every if kind)
+
+    def into(
+        self,
+        tree: bpy.types.NodeTree,
+        normal: bpy.types.NodeSocket | None,
+        material: Material,
+        mesh: HeadMesh,
+    ) -> Sent:
         """What a surface sends back, in the nodes of a material. normal: that of the mesh, if there is no
-        other. gloss: what decides it; 0 has none in any look."""
+        other."""
+        gloss = self._kind(material)
         normal = normal or tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
         node = tree.nodes.new("ShaderNodeGroup")
         if not gloss and not self.needs.maps:
             self._key = self._key or _key_light()
             node.node_tree = self._key
         else:
-            node.node_tree = self._looked_up(bool(gloss))
+            # What nobody cast rays for is open.
+            closed = self.needs.occlusion and mesh.openness is not None
+            node.node_tree = self._looked_up(closed, bool(gloss))
         tree.links.new(normal, node.inputs[0])
         if gloss:
-            tile = self._maps.shine(gloss)
+            tile = layout_of(self.kinds(mesh.materials)).shine[gloss]
             node.inputs[1].default_value, node.inputs[2].default_value = (
                 (*tile.scale, 0.0),
                 (*tile.middle, 0.0),
@@ -67,11 +82,14 @@ class FastLight:
 
     def expect(self, looks: Iterable[Lit]) -> None:
         """What is shown next, in order."""
-        if self.needs.maps or self._glossy:
+        if self.needs.maps or self._groups:
             self._maps.expect(looks)
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
-        """Make it that of a look, and of an environment where there is one; which of the sheets it is."""
+    def set(
+        self, look: Look, environment: EnvironmentLight | None, kinds: Iterable[Kinds]
+    ) -> Mapping[Kinds, int]:
+        """Make it that of a look, and of an environment where there is one. kinds: of each object that is
+        seen. Returns where each of these has its sheet."""
         if self._key is not None:
             with apart(self._key):
                 nodes = self._key.nodes
@@ -79,12 +97,18 @@ class FastLight:
                     key_strengths(look, environment)
                 )
                 nodes[_KEY].inputs[1].default_value = key_direction(look)
-        return self._maps.sheet(look, environment) if self._glossy else 0
+        each = tuple(dict.fromkeys(kinds))
+        return self._maps.sheets(look, environment, each) if self._groups else dict.fromkeys(each, 0)
 
-    def _looked_up(self, glossy: bool) -> bpy.types.NodeTree:
-        if glossy not in self._glossy:
-            self._glossy[glossy] = _looked_up(self._maps, self.needs.occlusion, glossy)
-        return self._glossy[glossy]
+    def _kind(self, material: Material) -> Kind:
+        """What decides a gloss; 0 where there is none in any look."""
+        kind = kind_of_gloss(material)
+        return 0.0 if isinstance(kind, str) and not self.needs.gloss else kind
+
+    def _looked_up(self, closed: bool, glossy: bool) -> bpy.types.NodeTree:
+        if (closed, glossy) not in self._groups:
+            self._groups[closed, glossy] = _looked_up(self._maps, closed, glossy)
+        return self._groups[closed, glossy]
 
 
 def _key_light() -> bpy.types.NodeTree:
@@ -105,30 +129,32 @@ def _key_light() -> bpy.types.NodeTree:
     return tree
 
 
-def _looked_up(maps: MapNodes, occlusion: bool, glossy: bool) -> bpy.types.NodeTree:
+def _looked_up(maps: MapNodes, closed: bool, glossy: bool) -> bpy.types.NodeTree:
     """ambient (normal) x what is not kept out + direct (normal) x 2 of its square, and what is mirrored.
 
-    Who sees little of the surroundings sees little of a lamp: the aperture of Chan, "Material advances in
-    Call of Duty: WWII" (SIGGRAPH 2018), here for lamps in all directions alike.
+    closed: is anything kept out? Who sees little of the surroundings sees little of a lamp: the aperture of
+    Chan, "Material advances in Call of Duty: WWII" (SIGGRAPH 2018), here for lamps in all directions alike.
     """
     tree = _group("looked up", glossy=glossy)
     given, out = tree.nodes.new("NodeGroupInput").outputs, tree.nodes.new("NodeGroupOutput").inputs
-    place = place_in(tree, given[0], AMBIENT)
-    ambient, share = maps.look_up(tree, place)
-    beside = vector_node(tree, "ADD", place, None)
-    beside.node.inputs[1].default_value = (DIRECT.x - AMBIENT.x, DIRECT.y - AMBIENT.y, 0.0)
-    direct, _ = maps.look_up(tree, beside)
+    place = place_in(tree, given[0], ALL)
+    light, _ = maps.look_up(tree, place)
     mirrored = _mirrored(tree, maps, given) if glossy else None
-    if occlusion:
+    if closed:
+        beside = vector_node(tree, "ADD", place, None)
+        beside.node.inputs[1].default_value = (AMBIENT.x - ALL.x, AMBIENT.y - ALL.y, 0.0)
+        ambient, share = maps.look_up(tree, beside)
         vertex = tree.nodes.new("ShaderNodeAttribute")
         vertex.attribute_name = OPENNESS
-        closed = math_node(tree, "SUBTRACT", 1.0, vertex.outputs["Fac"])
-        left = math_node(tree, "SUBTRACT", 1.0, math_node(tree, "MULTIPLY", share, closed))
+        kept_out = math_node(tree, "SUBTRACT", 1.0, vertex.outputs["Fac"])
+        left = math_node(tree, "SUBTRACT", 1.0, math_node(tree, "MULTIPLY", share, kept_out))
         lamps = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", left, left), 2.0)
         lamps.node.use_clamp = True
-        ambient, direct = scaled(tree, ambient, left), scaled(tree, direct, lamps)
+        # The light is ambient and direct: ambient x left + (light - ambient) x lamps.
+        more = scaled(tree, ambient, math_node(tree, "SUBTRACT", left, lamps))
+        light = vector_node(tree, "ADD", scaled(tree, light, lamps), more)
         mirrored = scaled(tree, mirrored, lamps) if mirrored else None
-    tree.links.new(vector_node(tree, "ADD", ambient, direct), out[0])
+    tree.links.new(light, out[0])
     if mirrored:
         tree.links.new(mirrored, out[1])
     return tree

@@ -13,9 +13,11 @@ import bpy
 from generator.blender import compat
 from generator.blender.clearing import clear
 from generator.blender.crop import Backdrop, Backdrops, Box, Outline, around
-from generator.blender.needs import Needs
+from generator.blender.devices import Device
+from generator.blender.needs import Needs, is_layered
 from generator.blender.passes import painting, render_passes
 from generator.blender.stage import Stage
+from generator.blender.still import render_still
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import load_package
 from generator.labels import LABELS
@@ -31,18 +33,26 @@ class Images:
     """Renders views of one head.
 
     Replaces everything in Blender by the head. mesh: frame U, mm, pivot at the origin.
-    threads: of Cycles; 0 lets Blender take every core. backdrops: of heads before.
+    threads: of Cycles; 0 lets Blender take every core. device: the CPU, where it is not given.
+    backdrops: of heads before.
     """
 
-    def __init__(self, mesh: HeadMesh, *, threads: int = 0, backdrops: Backdrops | None = None) -> None:
-        self._mesh, self._threads = mesh, threads
+    def __init__(
+        self,
+        mesh: HeadMesh,
+        *,
+        threads: int = 0,
+        device: Device | None = None,
+        backdrops: Backdrops | None = None,
+    ) -> None:
+        self._mesh, self._threads, self._device = mesh, threads, device or Device()
         self._outline = Outline(mesh.vertices)
         self._worn: dict[str, HeadMesh] = {}
         self._outlines: dict[str, Outline] = {}
         self._stage: Stage | None = None
         self._knows_uv = False
         self._empty: Any = None  # what an image without the head depends on, of the last view
-        self._ahead: list[tuple[Look, EnvironmentLight | None]] = []
+        self._ahead: list[tuple[Look, EnvironmentLight | None, Sequence[Worn]]] = []
         self._alike = 0  # views in a row for which that is the same
         self._backdrops = backdrops or Backdrops()
 
@@ -56,10 +66,17 @@ class Images:
         if self._stage is not None:
             self._stage.hang(self._worn)
 
-    def expect(self, views: Views, environments: Sequence[EnvironmentLight | None] = ()) -> None:
-        """What is rendered next, in order: it takes less time, and is the same."""
-        looks = [view.look for view in views]
-        self._ahead = list(zip(looks, environments or [None] * len(looks), strict=True))
+    def expect(
+        self,
+        views: Views,
+        environments: Sequence[EnvironmentLight | None] = (),
+        worn: Sequence[Sequence[Worn]] = (),
+    ) -> None:
+        """What is rendered next, in order, of what :meth:`wear` brought: it takes less time, and is the
+        same."""
+        count = len(views)
+        looks = (view.look for view in views)
+        self._ahead = list(zip(looks, environments or [None] * count, worn or [()] * count, strict=True))
         if self._stage is not None:
             self._stage.expect(self._ahead)
 
@@ -101,17 +118,26 @@ class Images:
             _render(path, box)
         backdrop.lay(path, box)
 
+    def layered(self, look: Look) -> bool:
+        """Is a head of this look rendered over nothing?"""
+        return is_layered(look)
+
     def render_over_nothing(
         self,
         view: View,
         path: Path,
         environment: EnvironmentLight | None = None,
         worn: Sequence[Worn] = (),
-    ) -> None:
-        """Render the head alone into path, .exr: linear, half floats, multiplied by alpha."""
+    ) -> Box | None:
+        """Render the head alone into path, .exr: linear, half floats, multiplied by alpha.
+
+        Returns which pixels path holds: those that it can cover. None if these are none: then it holds all.
+        """
         self._show(view, environment, worn)
         self._knows_uv = False
-        _render(path, self._box(view, worn), over_nothing=True)
+        box = self._box(view, worn)
+        _render(path, box, over_nothing=True)
+        return box
 
     def render_passes(self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
@@ -162,11 +188,15 @@ class Images:
         has_one = environment is not None
         if self._stage is None or not self._stage.fits(view.look, has_one):
             needs = Needs.of(view.look, has_one)
-            if self._stage is not None and view.look.preset == "fast":
-                needs |= self._stage.needs  # the next look may need again what this one does not
+            if view.look.preset == "fast":
+                # The next looks need what this one does not, and those before may come again.
+                for look, light, _ in self._ahead:
+                    needs |= Needs.of(look, light is not None)
+                needs |= self._stage.needs if self._stage is not None else needs
             self._stage = None
             clear()
             self._stage = Stage(bpy.context.scene, self._mesh, view.look, threads=self._threads, needs=needs)
+            self._device.use(bpy.context.scene)
             self._stage.hang(self._worn)
             self._stage.expect(self._ahead)
         self._stage.show(view, environment, worn)
@@ -174,9 +204,9 @@ class Images:
 
 
 def _render(path: Path, box: Box | None = None, *, over_nothing: bool = False) -> None:
-    """Render the scene as it stands into path, or the pixels of a box alone.
+    """Render the scene as it stands into path, or the pixels of a box alone, which path holds then.
 
-    over_nothing: with alpha, and as large as the whole image.
+    over_nothing: with alpha.
     """
     render = bpy.context.scene.render
     settings = render.image_settings
@@ -191,7 +221,7 @@ def _render(path: Path, box: Box | None = None, *, over_nothing: bool = False) -
         settings.file_format, settings.color_mode = "BMP", "RGB"
     else:
         raise ValueError(f"{path}: images are .bmp or .exr")
-    _render_again(path, box, cropped=not over_nothing)
+    _render_again(path, box, cropped=True)
 
 
 def _render_again(path: Path, box: Box | None, *, cropped: bool = False) -> None:
@@ -206,4 +236,4 @@ def _render_again(path: Path, box: Box | None, *, cropped: bool = False) -> None
         render.border_min_x, render.border_max_x = left, right
         render.border_min_y, render.border_max_y = bottom, top
     render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
+    render_still()

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 import bpy
@@ -13,7 +13,8 @@ from mathutils import Vector
 from generator.blender.fast_light import FastLight
 from generator.blender.lamps import key_direction, key_strengths, lamp_light
 from generator.blender.materials import srgb_to_linear
-from generator.blender.needs import Needs
+from generator.blender.needs import Needs, is_layered
+from generator.heads.shine import Kinds
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 
@@ -24,8 +25,11 @@ SUN_DIAMETER = math.radians(25.0)
 class Light(Protocol):
     """The light of a stage."""
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
-        """Make it that of a look, and of an environment where there is one; which sheet of maps has it."""
+    def set(
+        self, look: Look, environment: EnvironmentLight | None, kinds: Iterable[Kinds]
+    ) -> Mapping[Kinds, int]:
+        """Make it that of a look, and of an environment where there is one. kinds: of the gloss of each
+        object that is seen. Returns where in the maps each of these finds it."""
         ...
 
 
@@ -52,11 +56,17 @@ class LightInMaterials:
         self._background = tree.nodes.new("ShaderNodeBackground")
         tree.links.new(self._background.outputs[0], output.inputs["Surface"])
         self._fast = fast
+        self._color: tuple[float, float, float] | None = None
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
+    def set(
+        self, look: Look, environment: EnvironmentLight | None, kinds: Iterable[Kinds]
+    ) -> Mapping[Kinds, int]:
         """See :class:`Light`."""
-        self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
-        return self._fast.set(look, environment)
+        # Whatever is set in the world, Cycles compiles every material again.
+        if not is_layered(look) and look.background != self._color:
+            self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
+            self._color = look.background
+        return self._fast.set(look, environment, kinds)
 
 
 class LightInScene:
@@ -83,7 +93,9 @@ class LightInScene:
         self._key = _sun(scene, "key")
         self._lamps = [_sun(scene, "lamp") for _ in range(needs.lamps)]
 
-    def set(self, look: Look, environment: EnvironmentLight | None) -> int:
+    def set(
+        self, look: Look, environment: EnvironmentLight | None, kinds: Iterable[Kinds]
+    ) -> Mapping[Kinds, int]:
         """See :class:`Light`."""
         self._background.inputs["Color"].default_value = (*srgb_to_linear(look.background), 1.0)
         key, ambient = key_strengths(look, environment)
@@ -93,7 +105,7 @@ class LightInScene:
         _shine_from(self._key, key_direction(look), (key, key, key))
         for lamp, given in zip(self._lamps, look.lamps, strict=True):
             _shine_from(lamp, *lamp_light(given))
-        return 0
+        return dict.fromkeys(kinds, 0)
 
 
 def _sun(scene: bpy.types.Scene, name: str) -> bpy.types.Object:

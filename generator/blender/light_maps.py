@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from generator.blender.lamps import key_direction, key_strengths, lamp_light
-from generator.heads.shine import Kind
+from generator.heads.shine import Kind, Kinds
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
 
@@ -35,6 +35,9 @@ BORDER = 1
 
 FACING = 0.028
 """What a surface mirrors that is seen straight on: an index of refraction of 1.4, of skin and corneas."""
+
+CLEAR = 0.7
+"""Of a gloss above that the highlights are narrower than four texels of a coarse map."""
 
 LAMP_WIDTH = 0.012
 """1 / s of a lamp as wide as the quality preset's: a disc of 25 degrees."""
@@ -64,29 +67,32 @@ class Tile:
 
 
 AMBIENT = Tile(0, 0, WIDTH // 2, WIDTH // 4)
-DIRECT = Tile(WIDTH // 2, 0, WIDTH // 2, WIDTH // 4)
+ALL = Tile(WIDTH // 2, 0, WIDTH // 2, WIDTH // 4)
 
 
 class Layout:
-    """Which map lies where: light from everywhere, light from lamps, and what each kind of gloss mirrors."""
+    """Which map lies where in the sheet of an object: light from everywhere, that and the light of lamps, and
+    what each kind of gloss mirrors that its materials have."""
 
-    def __init__(self) -> None:
+    def __init__(self, kinds: Kinds) -> None:
         self.height = AMBIENT.height
         self.shine: dict[Kind, Tile] = {}
-        self._free: list[Tile] = []
-
-    def add(self, kind: Kind, *, fine: bool) -> Tile:
-        """The place of a kind of gloss. fine: its highlights may be narrow."""
-        if kind not in self.shine:
-            if fine:
+        free: list[Tile] = []
+        for kind in kinds:
+            if isinstance(kind, str) or kind > CLEAR:
                 self.shine[kind] = Tile(0, self.height, WIDTH, WIDTH // 2)
                 self.height += WIDTH // 2
-            else:
-                if not self._free:
-                    self._free = [Tile(x, self.height, WIDTH // 2, WIDTH // 4) for x in (WIDTH // 2, 0)]
-                    self.height += WIDTH // 4
-                self.shine[kind] = self._free.pop()
-        return self.shine[kind]
+                continue
+            if not free:
+                free = [Tile(x, self.height, WIDTH // 2, WIDTH // 4) for x in (WIDTH // 2, 0)]
+                self.height += WIDTH // 4
+            self.shine[kind] = free.pop()
+
+
+@lru_cache(maxsize=256)
+def layout_of(kinds: Kinds) -> Layout:
+    """The layout of an object whose materials have these kinds of gloss."""
+    return Layout(kinds)
 
 
 @lru_cache(maxsize=8)
@@ -116,6 +122,22 @@ class Light:
             lamps.append((environment.direction, environment.sun))
         self._lamps = np.array([direction for direction, _ in lamps], np.float32).reshape(-1, 3)
         self._colors = np.array([color for _, color in lamps], np.float32).reshape(-1, 3)
+        self._mirrored: dict[tuple[int, int, float], np.ndarray] = {}
+
+    @cached_property
+    def sent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Maps of what a white surface sends back: of light from everywhere, and of that and of lamps."""
+        normals = directions(AMBIENT.width, AMBIENT.height)
+        ambient = self.ambient(normals)
+        return ambient, ambient + self.direct(normals)
+
+    def shine(self, width: int, height: int, gloss: float) -> np.ndarray:
+        """A map of what is mirrored; made once for all objects that have that gloss."""
+        key = width, height, gloss
+        if key not in self._mirrored:
+            # Blender reflects where a look goes, which is the reverse of where the light comes from.
+            self._mirrored[key] = self.mirrored(-directions(width, height), gloss)
+        return self._mirrored[key]
 
     def ambient(self, normals: np.ndarray) -> np.ndarray:
         """What a white surface sends back of light from everywhere, linear RGB [..., 3]."""
@@ -171,23 +193,22 @@ def rim(gloss: float) -> float:
     return max(gloss**3, FACING)
 
 
-def drawn(layout: Layout, light: Light, glosses: Mapping[Kind, float], occlusion: float) -> np.ndarray:
-    """A sheet, float32 [layout.height, WIDTH, 4].
+def draw(
+    sheet: np.ndarray, layout: Layout, light: Light, glosses: Mapping[Kind, float], occlusion: float
+) -> None:
+    """Draw into a sheet of zeros, float32 [layout.height, WIDTH, 4].
 
     glosses: of each kind. The fourth number is the share of light that what is closed in loses, in the map of
     ambient light, and :func:`rim` in those of what is mirrored.
     """
-    sheet = np.zeros((layout.height, WIDTH, 4), np.float32)
 
-    def draw(tile: Tile, colors: np.ndarray, number: float) -> None:
-        place = sheet[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
-        place[..., :3], place[..., 3] = colors, number
+    def place(tile: Tile, colors: np.ndarray, number: float) -> None:
+        there = sheet[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+        there[..., :3], there[..., 3] = colors, number
 
-    normals = directions(AMBIENT.width, AMBIENT.height)
-    draw(AMBIENT, light.ambient(normals), occlusion)
-    draw(DIRECT, light.direct(normals), 1.0)
+    ambient, every = light.sent
+    place(AMBIENT, ambient, occlusion)
+    place(ALL, every, 1.0)
     for kind, tile in layout.shine.items():
-        # Blender reflects where a look goes, which is the reverse of where the light comes from.
-        rays = -directions(tile.width, tile.height)
-        draw(tile, light.mirrored(rays, glosses[kind]), rim(glosses[kind]))
-    return sheet
+        gloss = glosses[kind]
+        place(tile, light.shine(tile.width, tile.height, gloss), rim(gloss))

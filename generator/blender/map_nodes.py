@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Nodes that look up :mod:`generator.blender.light_maps`: one image of some looks' sheets, one above another.
 
-No number of a node changes from one look to the next, as Blender would compile every material again: which
-sheet it is says the colour of the object, and an image holds those of the looks to come.
+No number of a node changes from one look to the next, as Blender would compile every material again: in which
+row the sheet of an object begins says its colour, and an image holds those of the looks to come.
 """
 
 from __future__ import annotations
@@ -12,33 +12,26 @@ from collections.abc import Iterable, Mapping
 import bpy
 import numpy as np
 
-from generator.blender.light_maps import WIDTH, Layout, Light, Tile, drawn
-from generator.blender.nodes import SHEET, apart, math_node, of_object, vector_node
-from generator.heads.shine import Kind, gloss_of
+from generator.blender.light_maps import WIDTH, Light, Tile, draw, layout_of
+from generator.blender.nodes import CHANNELS, SHEET, apart, math_node, vector_node
+from generator.heads.shine import Kinds, gloss_of
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.settings import Look
-
-SHEETS = 16
-"""In an image, at most: of the looks that are shown next."""
 
 STEP, ROWS = 1 / 512, 1 << 14
 """Of a texel, in what is looked up, and the most rows of an image: no more digits than a float32 has, so
 that the place of a sheet is added exactly and a look is the same wherever its sheet lies."""
 
-CLEAR = 0.7
-"""Of a gloss above that the highlights are narrower than four texels of a coarse map."""
-
-Lit = tuple[Look, EnvironmentLight | None]
-"""What a sheet depends on."""
+Lit = tuple[Look, EnvironmentLight | None, tuple[Kinds, ...]]
+"""What some sheets depend on: one for every kind of object."""
 
 
 class MapNodes:
     """The image, and the nodes that read it."""
 
     def __init__(self) -> None:
-        self._layout = Layout()
         self._ahead: list[Lit] = []
-        self._sheets: dict[Lit, int] = {}
+        self._sheets: dict[Lit, dict[Kinds, int]] = {}
         self._image: bpy.types.Image | None = None
         self.tree = tree = bpy.data.node_groups.new("light maps", "ShaderNodeTree")
         tree.interface.new_socket("place", in_out="INPUT", socket_type="NodeSocketVector")
@@ -47,57 +40,55 @@ class MapNodes:
         given, out = tree.nodes.new("NodeGroupInput").outputs, tree.nodes.new("NodeGroupOutput").inputs
         inside = vector_node(tree, "SNAP", given[0], None)
         inside.node.inputs[1].default_value = (STEP, STEP, 0.0)
-        upwards = tree.nodes.new("ShaderNodeCombineXYZ")
-        self._height = math_node(tree, "MULTIPLY", of_object(tree, SHEET), 0.0).node
-        tree.links.new(self._height.outputs[0], upwards.inputs[1])
-        self._size = vector_node(
-            tree, "MULTIPLY", vector_node(tree, "ADD", inside, upwards.outputs[0]), None
-        ).node
+        numbers = tree.nodes.new("ShaderNodeObjectInfo").outputs["Color"]
+        upwards = vector_node(tree, "MULTIPLY_ADD", numbers, None, inside)
+        upwards.node.inputs[1].default_value = [channel == SHEET for channel in CHANNELS]
+        self._size = vector_node(tree, "MULTIPLY", upwards, None).node
         self._texture = tree.nodes.new("ShaderNodeTexImage")
         self._texture.extension = "EXTEND"
         tree.links.new(self._size.outputs[0], self._texture.inputs[0])
         for made, to in zip(self._texture.outputs, out, strict=False):
             tree.links.new(made, to)
 
-    def shine(self, kind: Kind) -> Tile:
-        """Where is what a kind of gloss mirrors?"""
-        if kind not in self._layout.shine:
-            self._sheets.clear()
-        return self._layout.add(kind, fine=isinstance(kind, str) or kind > CLEAR)
-
     def expect(self, looks: Iterable[Lit]) -> None:
         """What is shown next, in order. Without it the same is shown, but takes longer."""
         self._ahead = list(looks)
 
-    def sheet(self, look: Look, environment: EnvironmentLight | None) -> int:
-        """Which sheet has the light of a look; the image is made anew if none does."""
-        wanted = look, environment
+    def sheets(
+        self, look: Look, environment: EnvironmentLight | None, kinds: tuple[Kinds, ...]
+    ) -> dict[Kinds, int]:
+        """In which row of the image each kind of object has its sheet; it is made anew if one has none."""
+        wanted = look, environment, kinds
         if wanted not in self._sheets:
             there = self._ahead.index(wanted) if wanted in self._ahead else len(self._ahead)
-            count = min(SHEETS, max(1, ROWS // self._layout.height))
-            self._draw(dict.fromkeys([wanted, *self._ahead[there + 1 : there + count]]))
+            self._draw(dict.fromkeys([wanted, *self._ahead[there + 1 :]]))
         return self._sheets[wanted]
 
-    def _draw(self, looks: Mapping[Lit, None]) -> None:
-        sheets = []
-        for look, environment in looks:
-            glosses = {kind: gloss_of(kind, look.gloss) for kind in self._layout.shine}
-            sheets.append(drawn(self._layout, Light(look, environment), glosses, look.occlusion))
-        rows = np.concatenate(sheets)
-        height = 1 << (len(rows) - 1).bit_length()
+    def _draw(self, looks: Iterable[Lit]) -> None:
+        """The sheets of as many looks as an image holds, one at least."""
+        self._sheets = {}
+        end = 0
+        for lit in looks:
+            more = sum(layout_of(kinds).height for kinds in lit[2])
+            if self._sheets and end + more > ROWS:
+                break
+            self._sheets[lit] = {}
+            for kinds in lit[2]:
+                self._sheets[lit][kinds] = end
+                end += layout_of(kinds).height
+        height = 1 << (end - 1).bit_length()
         image = bpy.data.images.new("light", WIDTH, height, alpha=True, float_buffer=True, is_data=True)
         image.alpha_mode = "CHANNEL_PACKED"
         texels = np.zeros((height, WIDTH, 4), np.float32)
-        texels[: len(rows)] = rows
+        for lit, places in self._sheets.items():
+            _draw(texels, lit, places)
         image.pixels.foreach_set(texels.ravel())
         with apart(self.tree):
             self._texture.image = image
-            self._height.inputs[1].default_value = self._layout.height
             self._size.inputs[1].default_value = (1 / WIDTH, 1 / height, 0.0)
         if self._image is not None:
             bpy.data.images.remove(self._image)
         self._image = image
-        self._sheets = {look: number for number, look in enumerate(looks)}
 
     def look_up(
         self, tree: bpy.types.NodeTree, place: bpy.types.NodeSocket
@@ -107,6 +98,16 @@ class MapNodes:
         node.node_tree = self.tree
         tree.links.new(place, node.inputs[0])
         return node.outputs[0], node.outputs[1]
+
+
+def _draw(texels: np.ndarray, lit: Lit, places: Mapping[Kinds, int]) -> None:
+    """The sheet of every kind of object of a look, from the row that it has."""
+    look, environment, every = lit
+    light = Light(look, environment)
+    glosses = {kind: gloss_of(kind, look.gloss) for kinds in every for kind in kinds}
+    for kinds, start in places.items():
+        layout = layout_of(kinds)
+        draw(texels[start : start + layout.height], layout, light, glosses, look.occlusion)
 
 
 def place_in(

@@ -12,8 +12,8 @@ from generator.blender.label_group import labels_group
 from generator.blender.needs import Needs
 from generator.blender.nodes import math_node, scaled, vector_node
 from generator.blender.skin import Skin, relief
-from generator.heads.mesh import Material
-from generator.heads.shine import Kind, gloss_of, is_skin, kind_of_gloss
+from generator.heads.mesh import HeadMesh, Material
+from generator.heads.shine import gloss_of, is_skin, kind_of_gloss
 from generator.heads.tiling import EXTEND, MIRROR, REPEAT
 from generator.labels import LABELS
 
@@ -46,11 +46,11 @@ LIT, ALBEDO, LABELLED = "lit", "albedo", "labelled"
 
 
 def build_material(
-    material: Material, fast: FastLight | None, needs: Needs, *, has_vertex_colors: bool
+    material: Material, mesh: HeadMesh, fast: FastLight | None, needs: Needs
 ) -> bpy.types.Material:
     """A Blender material with the head's colour.
 
-    fast: the light of the fast preset, that it computes; without one it is path traced.
+    mesh: that it is of. fast: the light of the fast preset, that it computes; without one it is path traced.
     Raises FileNotFoundError or RuntimeError if the texture cannot be read.
     """
     made = bpy.data.materials.new(material.name)
@@ -59,11 +59,11 @@ def build_material(
     tree = made.node_tree
     tree.nodes.clear()
     tree.nodes.new("ShaderNodeOutputMaterial")
-    color, alpha = _base_color(tree, material, has_vertex_colors)
+    color, alpha = _base_color(tree, material, mesh.vertex_colors is not None)
     # Otherwise Cycles samples every triangle as a lamp: five times the time, same image.
     made.cycles.emission_sampling = "NONE"
     skin = relief(tree, color) if needs.relief and is_skin(material) else Skin(color)
-    surface = _principled(tree, skin) if fast is None else _lit_by_normal(tree, skin, fast, material)
+    surface = _principled(tree, skin) if fast is None else _lit_by_normal(tree, skin, fast, material, mesh)
     label = _label_color(tree, material)
     for name, lit in ((LIT, surface), (ALBEDO, _emitted(tree, color)), (LABELLED, _emitted(tree, label))):
         if material.cutout and alpha is not None:
@@ -135,11 +135,18 @@ def _times(
 
 
 def _load_image(path: Path) -> bpy.types.Image:
-    image = bpy.data.images.load(str(path), check_existing=True)
+    # Not one that somebody loaded for something else: this one is changed.
+    image = next((one for one in bpy.data.images if _is_texture(one, path)), None)
+    if image is None:
+        image = bpy.data.images.load(str(path))
     if not image.has_data and image.size[0] == 0:
         raise RuntimeError(f"{path}: Blender cannot read this texture")
     image.alpha_mode = "CHANNEL_PACKED"
     return image
+
+
+def _is_texture(image: bpy.types.Image, path: Path) -> bool:
+    return image.filepath == str(path) and image.alpha_mode == "CHANNEL_PACKED"
 
 
 def set_gloss(made: bpy.types.Material, skin: float) -> None:
@@ -174,14 +181,11 @@ def _label_color(tree: bpy.types.NodeTree, material: Material) -> bpy.types.Node
 
 
 def _lit_by_normal(
-    tree: bpy.types.NodeTree, skin: Skin, fast: FastLight, material: Material
+    tree: bpy.types.NodeTree, skin: Skin, fast: FastLight, material: Material, mesh: HeadMesh
 ) -> bpy.types.NodeSocket:
     """Emission = colour x what a white surface of this normal sends back, and what it mirrors."""
     emission = tree.nodes.new("ShaderNodeEmission")
-    gloss: Kind = kind_of_gloss(material)
-    if isinstance(gloss, str) and not fast.needs.gloss:
-        gloss = 0.0
-    lit = fast.into(tree, skin.normal, gloss)
+    lit = fast.into(tree, skin.normal, material, mesh)
     sent = _times(tree, skin.color, lit.light)
     if lit.shine is not None:
         mirrored = lit.shine

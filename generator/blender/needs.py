@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass, replace
 
+from generator.plan.render_settings import NOTHING, PLAIN, is_denoised
 from generator.plan.settings import Look
 
 
@@ -44,3 +45,13 @@ class Needs:
         if self.maps != others.maps:
             return self
         return replace(Needs(*map(max, astuple(self), astuple(others))), relief=self.relief)
+
+
+def is_layered(look: Look) -> bool:
+    """Is the head of a look rendered alone, over nothing, to be laid over what is behind it?
+
+    Where light is looked up that is less work than a plain backdrop, too: that is a colour of the world, and
+    Cycles compiles every material again for another. And a denoiser would not leave it one colour.
+    """
+    looked_up = look.preset == "fast" and Needs.of(look, look.environment != NOTHING).maps
+    return look.backdrop != PLAIN or looked_up or is_denoised(look)

@@ -10,7 +10,7 @@ import bpy
 
 BLACK = (0.0, 0.0, 0.0)
 
-SHEET, OCTAVES, LEAN = "Red", "Green", "Blue"
+CHANNELS = OCTAVES, SHEET, LEAN = "Red", "Green", "Blue"
 """Numbers that are no colour: the colour of an object is what Blender tells its materials without compiling
 them again."""
 
@@ -54,7 +54,7 @@ def vector_node(
 
 
 def of_object(tree: bpy.types.NodeTree, number: str) -> bpy.types.NodeSocket:
-    """SHEET, OCTAVES or LEAN of the object that is seen."""
+    """OCTAVES, SHEET or LEAN of the object that is seen."""
     split = tree.nodes.new("ShaderNodeSeparateColor")
     tree.links.new(tree.nodes.new("ShaderNodeObjectInfo").outputs["Color"], split.inputs[0])
     return split.outputs[number]

@@ -13,6 +13,7 @@ from generator.blender import compat
 from generator.blender.label_group import tell_apart
 from generator.blender.materials import ALBEDO, LABELLED, LIT, show
 from generator.blender.stage import Stage
+from generator.blender.still import render_still
 from generator.labels import LABELS
 from generator.plan.passes import ALBEDO as ALBEDO_PASS
 from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, SEGMENTATION
@@ -32,24 +33,31 @@ def render_passes(
     Where there is no surface object_index is 0, so it is always among them. Raises UsageError
     for a pass that is none of :data:`generator.registries.PASSES`.
     """
-    scene = bpy.context.scene
-    render = scene.render
     head.pass_index = HEAD_INDEX
     for thing in worn:
         thing.pass_index = WORN_INDEX
+    render_passes_alone(path, passes)
+
+
+def render_passes_alone(path: Path, passes: Sequence[str]) -> None:
+    """:func:`render_passes` of objects that have their index."""
+    scene = bpy.context.scene
+    render = scene.render
     layer = scene.view_layers[0]
     switches = {PASSES.get(name).switch for name in PASSES} - {PAINTED}
     wanted = {OBJECT_INDEX.switch, *(PASSES.get(name).switch for name in passes)}
-    with _restored(scene.cycles, "samples", "pixel_filter_type", "filter_width"):
+    kept = ("samples", "pixel_filter_type", "filter_width", "use_adaptive_sampling", "use_denoising")
+    with _restored(scene.cycles, *kept), _restored(render, "film_transparent"):
         for switch in switches:
             setattr(layer, switch, switch in wanted)
         scene.cycles.samples = 1
+        scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
         scene.cycles.pixel_filter_type = "BOX"
         scene.cycles.filter_width = CENTRE_ONLY
         compat.use_multilayer(render.image_settings)
         render.use_border = render.film_transparent = False
         render.filepath = str(path)
-        bpy.ops.render.render(write_still=True)
+        render_still()
     for switch in switches:
         setattr(layer, switch, False)
 

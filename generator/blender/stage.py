@@ -21,7 +21,9 @@ from generator.geometry.rotation import (
     rotation_from_angles,
 )
 from generator.heads.mesh import HeadMesh
+from generator.heads.shine import Kinds
 from generator.plan.environment_light import EnvironmentLight
+from generator.plan.render_settings import is_denoised
 from generator.plan.settings import Look
 from generator.plan.views import View
 from generator.plan.wear import Worn
@@ -33,6 +35,9 @@ AWAY = Matrix.Translation((0.0, -1000.0, 0.0))
 """Far behind the camera, where no ray comes near."""
 
 QUALITY_BOUNCES = 2
+
+_HEAD = ""
+"""Among packages, the head."""
 
 TRANSPARENT_LAYERS = 8
 """Through which a ray goes."""
@@ -64,8 +69,9 @@ class Stage:
         self.needs = needs or Needs.of(look)
         self._fast = FastLight(self.needs) if look.preset == "fast" else None
         self._worn: dict[str, list[bpy.types.Object]] = {}
+        self._kinds: dict[str, Kinds] = {}
         self._on: list[str] = []
-        own = self._make("head", mesh)
+        own = self._make("head", mesh, _HEAD)
         self.head = own[0]
         for thing in own:
             scene.collection.objects.link(thing)
@@ -115,10 +121,13 @@ class Stage:
             self._set_light(view.look, environment, pixel_mm)
             self._lit = lit
 
-    def expect(self, looks: Iterable[tuple[Look, EnvironmentLight | None]]) -> None:
-        """What is shown next, in order: it takes less time, and is the same."""
+    def expect(self, looks: Iterable[tuple[Look, EnvironmentLight | None, Sequence[Worn]]]) -> None:
+        """What is shown next, in order, of what :meth:`hang` brought: it takes less time, and is the same."""
         if self._fast is not None:
-            self._fast.expect(looks)
+            self._fast.expect(
+                (look, environment, self._kinds_of([one.package for one in worn]))
+                for look, environment, worn in looks
+            )
 
     def see_through_all(self) -> None:
         """Leave nothing to chance of what is seen through several layers; a head alone always did."""
@@ -130,9 +139,10 @@ class Stage:
             if package not in worn:
                 self._put_on([other for other in self._on if other != package])
                 self._remove(self._worn.pop(package))
+                del self._kinds[package]
         for package, mesh in worn.items():
             if package not in self._worn:
-                self._worn[package] = self._make("worn", mesh)
+                self._worn[package] = self._make("worn", mesh, package)
                 for thing in self._worn[package]:
                     self.scene.collection.objects.link(thing)
                 self._take_off(package)
@@ -148,9 +158,10 @@ class Stage:
         return [self.head, *(thing[0] for thing in self._worn.values())]
 
     def _set_light(self, look: Look, environment: EnvironmentLight | None, pixel_mm: float) -> None:
-        sheet = self._light.set(look, environment)
-        for thing in self.objects:
-            thing.color = (sheet, *relief_of(look.skin_detail, pixel_mm), 1.0)
+        sheets = self._light.set(look, environment, self._kinds_of(self._on))
+        octaves, lean = relief_of(look.skin_detail, pixel_mm)
+        for thing, package in zip(self.objects, (_HEAD, *self._on), strict=True):
+            thing.color = (octaves, sheets[self._kinds[package]], lean, 1.0)
             if self._fast is None:
                 for material in thing.data.materials:
                     set_gloss(material, look.gloss)
@@ -175,8 +186,13 @@ class Stage:
         if self._fast is None:
             set_seen(self._worn[package][0], False)
 
-    def _make(self, name: str, mesh: HeadMesh) -> list[bpy.types.Object]:
+    def _kinds_of(self, worn: Iterable[str]) -> tuple[Kinds, ...]:
+        """Each once, of the head and of what it wears, whatever it put on first."""
+        return tuple(sorted({self._kinds[package] for package in (_HEAD, *worn)}, key=str))
+
+    def _make(self, name: str, mesh: HeadMesh, package: str) -> list[bpy.types.Object]:
         """An object and, for the fast preset, its twin; not in the scene yet."""
+        self._kinds[package] = () if self._fast is None else self._fast.kinds(mesh.materials)
         made = _build_object(name, mesh, self._fast, self.needs)
         # Path tracing meets the mesh so often that a tree of its own, built anew, is the quicker one.
         return [made] if self._fast is None else [made, _unseen_twin(made)]
@@ -211,23 +227,29 @@ def turn(head: bpy.types.Object, ypr_deg: Sequence[float]) -> None:
 
 def set_camera(scene: bpy.types.Scene, thing: bpy.types.Object, camera: Camera) -> None:
     """Make Blender's camera see what a camera of ours sees, to the last digit of float32."""
-    data, distance = thing.data, camera.distance_mm
+    set_lens(thing.data, camera, METRES)
+    # A Blender camera looks along its own -z; a quarter turn about x makes that +y, into the scene.
+    away = Matrix.Translation((0, -camera.distance_mm * METRES, 0))
+    thing.matrix_world = away @ Matrix.Rotation(np.pi / 2, 4, "X")
+    scene.render.resolution_x, scene.render.resolution_y = camera.width, camera.height
+
+
+def set_lens(data: bpy.types.Camera, camera: Camera, unit: float) -> None:
+    """All of a camera but where it stands. unit: of Blender's, a millimetre."""
+    distance = camera.distance_mm
     data.sensor_fit = "HORIZONTAL"
     data.sensor_width = SENSOR_MM
     data.lens = camera.lens_mm
     data.type = "PERSP"
     if camera.projection == "orthographic":
         data.type = "ORTHO"
-        data.ortho_scale = camera.view_mm * METRES
+        data.ortho_scale = camera.view_mm * unit
     # Blender counts shifts in widths of the image, and turns the camera's side to where it shifts.
     x, y = camera.centre_px.tolist()
     data.shift_x = 0.5 - x / camera.width
     data.shift_y = (y - camera.height / 2.0) / camera.width
-    data.clip_start = 0.01 * distance * METRES
-    data.clip_end = 100 * distance * METRES
-    # A Blender camera looks along its own -z; a quarter turn about x makes that +y, into the scene.
-    thing.matrix_world = Matrix.Translation((0, -distance * METRES, 0)) @ Matrix.Rotation(np.pi / 2, 4, "X")
-    scene.render.resolution_x, scene.render.resolution_y = camera.width, camera.height
+    data.clip_start = 0.01 * distance * unit
+    data.clip_end = 100 * distance * unit
 
 
 def _unseen_twin(head: bpy.types.Object) -> bpy.types.Object:
@@ -262,15 +284,12 @@ def _build_object(name: str, mesh: HeadMesh, fast: FastLight | None, needs: Need
         colors[:, :3] = mesh.vertex_colors
         attribute = made.color_attributes.new(VERTEX_COLORS, "BYTE_COLOR", "POINT")
         attribute.data.foreach_set("color_srgb", colors.ravel())
-    if needs.occlusion:
-        # What nobody cast rays for is open: an attribute that is missing would be black.
-        openness = np.ones(len(vertices)) if mesh.openness is None else mesh.openness
-        made.attributes.new(OPENNESS, "FLOAT", "POINT").data.foreach_set("value", openness.astype(np.float32))
+    if needs.occlusion and mesh.openness is not None:
+        openness = made.attributes.new(OPENNESS, "FLOAT", "POINT").data
+        openness.foreach_set("value", mesh.openness.astype(np.float32))
     made.update(calc_edges=True)
     for material in mesh.materials:
-        made.materials.append(
-            build_material(material, fast, needs, has_vertex_colors=mesh.vertex_colors is not None)
-        )
+        made.materials.append(build_material(material, mesh, fast, needs))
     return bpy.data.objects.new(name, made)
 
 
@@ -292,7 +311,11 @@ def _set_render(scene: bpy.types.Scene, look: Look, threads: int) -> None:
     cycles.device = "CPU"
     cycles.seed = 0
     cycles.use_adaptive_sampling = False
-    cycles.use_denoising = False
+    cycles.use_denoising = is_denoised(look)
+    if cycles.use_denoising:
+        cycles.denoiser, cycles.denoising_quality = "OPENIMAGEDENOISE", "FAST"
+        cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", "FAST"
+        cycles.denoising_use_gpu = False
     cycles.use_light_tree = False
     cycles.samples = look.cycles_samples
     bounces = 0 if look.preset == "fast" else QUALITY_BOUNCES

@@ -47,6 +47,7 @@ from generator.process import end_with_parent, few_cores, limited_memory  # noqa
 
 WORDS = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
 THREADS = int(WORDS[0]) if __name__ == "__main__" and WORDS else 0
+GPU = int(WORDS[1]) if __name__ == "__main__" and len(WORDS) > 1 else None
 
 if __name__ == "__main__":
     end_with_parent()  # before bpy, which takes a second to load: its host may die in it
@@ -58,8 +59,11 @@ with few_cores(THREADS):
 from generator.blender import compat  # noqa: E402
 from generator.blender.clearing import clear  # noqa: E402
 from generator.blender.crop import Backdrops  # noqa: E402
+from generator.blender.devices import Device  # noqa: E402
 from generator.blender.images import Images  # noqa: E402
 from generator.blender.importing import export_glb, import_mesh  # noqa: E402
+from generator.blender.scene_images import SceneImages  # noqa: E402
+from generator.blender.scene_reading import read_scene  # noqa: E402
 from generator.errors import HeadError  # noqa: E402
 from generator.heads.package import load_package  # noqa: E402
 from generator.messages import (  # noqa: E402
@@ -68,12 +72,12 @@ from generator.messages import (  # noqa: E402
     OrderFailed,
     Rendered,
     RenderOrder,
+    SceneOrder,
     WorkerReady,
     from_json,
     to_json,
 )
 from generator.plan.passes import PAINTED  # noqa: E402
-from generator.plan.render_settings import PLAIN  # noqa: E402
 from generator.registries import PASSES  # noqa: E402
 
 MAX_IMPORT_MIB = 8192
@@ -86,10 +90,10 @@ Answer = Callable[[Any], None]
 class RenderWorker:
     """Keeps one head loaded and renders any view of it."""
 
-    def __init__(self, threads: int) -> None:
-        self._threads = threads
+    def __init__(self, threads: int, device: Device) -> None:
+        self._threads, self._device = threads, device
         self._loaded: tuple[Path, int] | None = None
-        self._images: Images | None = None
+        self._images: Images | SceneImages | None = None
         self._backdrops = Backdrops()
 
     def carry_out(self, order: Any, answer: Answer) -> None:
@@ -98,6 +102,9 @@ class RenderWorker:
             self._render(order, answer)
         elif isinstance(order, ConvertOrder):
             self._convert(order)
+        elif isinstance(order, SceneOrder):
+            self._loaded = self._images = None
+            read_scene(order)
         else:
             raise TypeError(f"{type(order).__name__} is no order for a render worker")
         answer(OrderDone())
@@ -108,26 +115,33 @@ class RenderWorker:
         if wanted != self._loaded:
             self._loaded = None
             mesh = load_package(package)
-            self._images = Images(mesh, threads=self._threads, backdrops=self._backdrops)
+            self._images = None
+            if mesh.scene is not None:
+                self._images = SceneImages(mesh.scene, threads=self._threads, device=self._device)
+            else:
+                self._images = Images(
+                    mesh, threads=self._threads, device=self._device, backdrops=self._backdrops
+                )
             self._loaded = wanted
         assert self._images is not None
         self._images.wear(one.package for worn in order.worn for one in worn)
         if order.passes:
             self._render_passes(self._images, order, answer)
             return
-        self._images.expect(order.views, order.lights)
+        self._images.expect(order.views, order.lights, order.worn)
         for place, view in enumerate(order.views):
             path = Path(order.out) / f"{place:06d}.{order.format}"
             environment = order.lights[place] if order.lights else None
             worn = order.worn[place] if order.worn else ()
-            if view.look.backdrop != PLAIN:
+            if self._images.layered(view.look):
                 path = path.with_suffix(".exr")
-                self._images.render_over_nothing(view, path, environment, worn)
+                box = self._images.render_over_nothing(view, path, environment, worn)
             else:
                 self._images.render(view, path, environment, worn)
-            answer(Rendered(place, str(path)))
+                box = None
+            answer(Rendered(place, str(path), box))
 
-    def _render_passes(self, images: Images, order: RenderOrder, answer: Answer) -> None:
+    def _render_passes(self, images: Images | SceneImages, order: RenderOrder, answer: Answer) -> None:
         """All views' passes of one kind and then of the other: each kind has a stage of its own."""
         painted = [name for name in order.passes if PASSES.get(name).switch == PAINTED]
         paths = [Path(order.out) / f"{place:06d}.{order.format}" for place in range(len(order.views))]
@@ -148,7 +162,7 @@ class RenderWorker:
         Path(order.target).with_suffix(".json").write_text(json.dumps(names), encoding="utf-8")
 
 
-def main(threads: int) -> None:
+def main(threads: int, gpu: int | None = None) -> None:
     """Serve orders from stdin until it closes."""
     # Receipts get stdout to themselves. What Blender prints there, 5 kB a frame, would fill the log.
     receipts = os.fdopen(os.dup(1), "w", buffering=1)
@@ -158,8 +172,11 @@ def main(threads: int) -> None:
         receipts.write(json.dumps(to_json(message)) + "\n")
 
     version = compat.check_version()
-    worker = RenderWorker(threads)
-    answer(WorkerReady(version))
+    if threads == 1:
+        compat.write_exr_alone()
+    device = Device(gpu)
+    worker = RenderWorker(threads, device)
+    answer(WorkerReady(version, str(device)))
     for line in sys.stdin:
         try:
             order = from_json(json.loads(line))
@@ -177,4 +194,4 @@ def _named(order: Any) -> str:
 
 
 if __name__ == "__main__":
-    main(THREADS)
+    main(THREADS, GPU)

@@ -32,3 +32,10 @@ def _run() -> None:
         # Without rich, whose import may be what was stopped.
         sys.stderr.write(f"headturn: {stopped}; run the same command again to continue\n")
         sys.exit(stopped.exit_code)
+    except ImportError as error:
+        from litert_faces.installing import numpy_clash
+
+        if (line := numpy_clash(error)) is None:
+            raise
+        sys.stderr.write(f"headturn: {line}\n")
+        sys.exit(1)

@@ -29,14 +29,14 @@ def ablate(
     predictions: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Also what a model said: .csv or .parquet with sample_id, yaw_deg, pitch_deg, roll_deg, of "
+            help="Answers of a model: .csv or .parquet with sample_id, yaw_deg, pitch_deg, roll_deg, of "
             "rows and twins, or as downstream-hpe predict writes it; repeatable."
         ),
     ] = None,
     figures: Annotated[
         Path | None, typer.Option("--out", help="All figures as CSV; ablation.csv in the dataset if absent.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of the resampling.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the resampling.")] = 0,
     as_json: JsonFlag = False,
 ) -> None:
     """What each factor does to detection, landmarks and pose, from rows and their twins.

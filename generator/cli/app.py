@@ -14,11 +14,12 @@ from typing import Annotated
 import typer
 
 from generator import __version__
-from generator.cli import ablate, blender, build, export, heads, preview, replay, upgrade, verify
+from generator.cli import ablate, blender, build, doctor, export, heads, preview, replay, upgrade, verify
 from generator.cli.console import err, say
 from generator.errors import HeadturnError
+from litert_faces.installing import install_command
 
-COMMANDS = (build, verify, preview, export, ablate, replay, upgrade, heads, blender)
+COMMANDS = (build, verify, preview, export, ablate, replay, upgrade, heads, doctor, blender)
 """Modules whose ``register`` adds commands."""
 
 EXTRAS = {
@@ -77,7 +78,7 @@ def _one_line_errors() -> Iterator[None]:
             raise
         missing = isinstance(error, ModuleNotFoundError)
         what = f"{name} is not installed" if missing else f"{name} cannot be imported ({error})"
-        say(f"headturn: {what}: pip install 'headturn[{EXTRAS[name]}]'", err, style="red")
+        say(f"headturn: {what}: {install_command(EXTRAS[name])}", err, style="red")
         sys.exit(1)
 
 

@@ -29,11 +29,14 @@ def environment() -> None:
 
 def preview_server(
     blender: Annotated[str | None, typer.Option("--blender", help="A Blender executable.")] = None,
+    blender_of_scenes: Annotated[
+        str | None, typer.Option("--blender-of-scenes", help="Another one, for heads in Blender scenes.")
+    ] = None,
 ) -> None:
     """Serve previews over stdin and stdout; see generator/execution/preview/server.py."""
     from generator.execution.preview.server import serve
 
-    serve(blender)
+    serve(blender, blender_of_scenes)
 
 
 def register(app: typer.Typer) -> None:

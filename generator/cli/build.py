@@ -18,7 +18,8 @@ from generator.cli.options import with_settings
 from generator.cli.reporter import JsonReporter, TerminalReporter
 from generator.errors import HeadturnError
 from generator.escape import printable
-from generator.execution.lanes.options import DEADLINE_S
+from generator.execution.lanes.options import CPU, DEADLINE_S, DEVICES
+from generator.heads.head import is_scene
 from generator.limits import MAX_WORKERS
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.settings import Values, all_settings
@@ -26,11 +27,18 @@ from generator.plan.settings import Values, all_settings
 
 def build(
     config_file: Annotated[
-        Path | None, typer.Argument(metavar="[CONFIG.toml]", help="Configuration; flags override it.")
+        Path | None,
+        typer.Argument(
+            metavar="[CONFIG.toml|SCENE.blend]",
+            help="Configuration, or a Blender scene with the head; flags override it.",
+        ),
     ] = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the dataset.")] = Path("dataset"),
     workers: Annotated[
-        int | None, typer.Option(min=1, max=MAX_WORKERS, help="Lanes; default one a core.")
+        int | None,
+        typer.Option(
+            min=1, max=MAX_WORKERS, help="Lanes, a render worker and a detector each; default one a core."
+        ),
     ] = None,
     executor: Annotated[
         str,
@@ -52,6 +60,12 @@ def build(
             help="MiB a lane may grow to; default 80 % of the machine's, or its container's, for all.",
         ),
     ] = None,
+    device: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(DEVICES), help="What images are rendered on; auto is a GPU where there is one."
+        ),
+    ] = CPU,
     fresh: Annotated[bool, typer.Option("--fresh", help="Delete the dataset that is there first.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,
     blender: BlenderOption = None,
@@ -64,6 +78,9 @@ def build(
     Run it again to continue a build that was interrupted, or with more heads or
     poses to extend it.
     """
+    if config_file is not None and is_scene(config_file):
+        overrides.setdefault("heads", {}).setdefault("source", str(config_file))
+        config_file = None
     run(
         load_config(config_file, overrides),
         folder,
@@ -76,6 +93,7 @@ def build(
             "blender": blender,
             "deadline_s": deadline,
             "memory_mib": memory,
+            "device": device,
             "address": address,
         },
     )
@@ -122,7 +140,9 @@ def run(
 def compact(
     folder: Annotated[Path, typer.Argument(help="A finished dataset.")],
     target: Annotated[Path, typer.Option("--out", help="Folder of the new dataset.")],
-    megabytes: Annotated[int, typer.Option(min=1, max=10**6, help="Size of a part, about.")] = 256,
+    megabytes: Annotated[
+        int, typer.Option(min=1, max=10**6, help="Megabytes of a part, a Parquet file, about.")
+    ] = 256,
     as_json: JsonFlag = False,
 ) -> None:
     """Merge the parts of a dataset into a few large ones, as a new dataset with the same rows."""

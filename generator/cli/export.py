@@ -24,15 +24,21 @@ def export(
     landmarks: Annotated[
         str,
         typer.Option(
-            help="Of formats with landmarks: exact (the mesh's), detected, or auto: the mesh's if all have."
+            help="Exact landmarks (the mesh's), detected ones, or auto: exact if all heads have them."
         ),
     ] = "auto",
     missing: Annotated[
         str | None,
         typer.Option(help="Rows without a detection or landmarks: fail, keep, skip, or exact to fill."),
     ] = None,
+    image_format: Annotated[
+        str | None,
+        typer.Option(
+            "--image-format", help="For nlml-hpe, whose versions look for one or the other: jpg or png."
+        ),
+    ] = None,
     public: Annotated[
-        bool, typer.Option("--public", help="It will be published, whatever the format.")
+        bool, typer.Option("--public", help="The export will be published, whatever the format.")
     ] = False,
     only_redistributable: Annotated[
         bool, typer.Option("--only-redistributable", help="Leave out heads that may not be published.")
@@ -47,16 +53,17 @@ def export(
 
     huggingface and croissant are meant for publication: they refuse heads that may not be published.
     """
-    from generator.dataset.export.options import ExportOptions, Landmarks
+    from generator.dataset.export.options import ExportOptions, Format, ImageFormat, Landmarks
     from generator.dataset.export.run import export_dataset
     from generator.dataset.format.manifest import read_manifest
     from generator.dataset.format.missing import Missing
 
-    FORMATS.get(format_)  # before anything is read
-    # Both are checked where they are used, against what the format takes.
+    chosen: Format = FORMATS.get(format_)  # before anything is read
+    # All three are checked where they are used, against what the format takes.
     options = ExportOptions(
         landmarks=cast(Landmarks, landmarks),
         missing=cast("Missing | None", missing),
+        image_format=cast("ImageFormat | None", image_format),
         public=public,
         only_redistributable=only_redistributable,
         may_publish=may_publish,
@@ -75,6 +82,8 @@ def export(
         lines.append(f"left out  {done.left_out} rows without a detection or landmarks")
     if done.withheld:
         lines.append(f"left out  {done.withheld} rows that may not be published")
+    if chosen.note:
+        lines.append(f"note      {chosen.note}")
     lines.append(f"read      {done.target / 'README.md'}")
     for line in lines:
         say(line)

@@ -32,7 +32,7 @@ def heads_make(
     ] = Heads.sampled_expressions,
     source: Annotated[
         str,
-        typer.Option(help='"parametric", of MakeHuman\'s CC0 data, or "ict:PATH", of your ICT-FaceKit.'),
+        typer.Option(help='"parametric", from MakeHuman\'s CC0 data, or "ict:PATH", from your ICT-FaceKit.'),
     ] = PARAMETRIC,
     workers: Annotated[
         int | None, typer.Option(min=1, max=MAX_WORKERS, help="Processes; default one a core where it pays.")
@@ -48,7 +48,8 @@ def heads_make(
         reporter.stage("making heads", count)
         made = maker.make(folder, wish, reporter.advance)
     command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
-    say(f"{len(made.subjects)} heads in {folder}; build with: {command}")
+    heads = "1 head" if len(made.subjects) == 1 else f"{len(made.subjects)} heads"
+    say(f"{heads} in {folder}; build with: {command}")
 
 
 @heads_app.command("list", epilog="Example: headturn heads list /data/facescape")

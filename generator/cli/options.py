@@ -157,7 +157,7 @@ def _parameter(flag: str, group: list[Setting], defaults: Mapping[str, Any]) -> 
     option = typer.Option(
         *names,
         metavar=metavar,
-        help=_help(group),
+        help=_help(group, said=default is None),
         rich_help_panel=f"Settings: {first.section}",
         show_default=default is not None,
     )
@@ -167,14 +167,14 @@ def _parameter(flag: str, group: list[Setting], defaults: Mapping[str, Any]) -> 
     )
 
 
-def _help(group: list[Setting]) -> str:
-    """A line: what it is, its unit, its default."""
+def _help(group: list[Setting], said: bool) -> str:
+    """A line: what it is, its unit, and if it is to be said, its default."""
     first, info = group[0], group[0].info
     unit = f" ({info.unit})" if info.unit else ""
     usual = ",".join(_shown(s.default) for s in group) if len({s.section for s in group}) == 1 else ""
     if _first_and_further(group):
         usual = str(first.default)
-    if first.flag == "--poses" or first.default in (None, ()):
+    if not said or first.flag == "--poses" or first.default in (None, ()):
         usual = ""
     text = f"{info.help}{unit}{f'; default {usual}' if usual else ''}"
     return text if text.endswith("?") else f"{text}."

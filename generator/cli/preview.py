@@ -21,7 +21,9 @@ DEFAULTS = {"render.preset": "quality", "render.resolution": 512}
 
 _OF_DRAWS = "poses.seed"
 
-_OF_MESHES = ("heads.units", "heads.up", "heads.forward", "heads.eye_distance_mm", "heads.without")
+_OF_MESHES = tuple(
+    f"heads.{key}" for key in ("units", "up", "forward", "eye_distance_mm", "without", "head_object")
+)
 
 
 def preview(

@@ -32,9 +32,7 @@ def verify(
             help="Decode the images of N rows, render them again from their heads, and compare.",
         ),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(help="Another one, other N rows. Who knows it knows which are looked at.")
-    ] = 0,
+    seed: Annotated[int, typer.Option(help="Chooses the N rows; take one that nobody expects.")] = 0,
     heads: Annotated[
         Path | None, typer.Option(help="For --deep: where the head source lies now, if it moved.")
     ] = None,
@@ -46,12 +44,12 @@ def verify(
 ) -> None:
     """Prove that every row of the plan is there once, labels agree and hashes match.
 
-    Not proved: that images show what was recorded (--deep renders some or all of them again, which takes
-    the heads and the versions of the build), nor that nobody recorded it all anew, hashes included (give
-    --digest the Merkle root that the dataset's maker tells you; the digest is a checksum, which finds
-    damage but no deceit).
+    It does not prove that images show what was recorded: --deep renders some or all of them again, and needs
+    the heads and the versions of the build. Nor does it prove that nobody made it all anew, hashes included:
+    give --digest the Merkle root that the dataset's maker tells you. The digest is a checksum, which finds
+    damage but no deceit.
 
-    Exit code 1 if anything is wrong, 3 if nothing is but --deep could not render all rows it chose.
+    Exit code 1 if anything is wrong, 3 if nothing is wrong but --deep could not render all rows it chose.
     """
     from generator.dataset.proof.verify import verify_dataset
 

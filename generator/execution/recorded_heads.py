@@ -31,6 +31,7 @@ class RecordedHeads:
         self._path = moved or source_path(config, root)
         self._source: dict[Key, Head] | None = None
         self._found: dict[Key, Head | HeadturnError] = {}
+        self._sha256: dict[str, str] = {}  # of files that expressions share
 
     def of(self, key: Key) -> Head:
         """A head. Raises HeadError: it is not there, or not as it was; UsageError: its source is none."""
@@ -63,7 +64,9 @@ class RecordedHeads:
         for name, sha256 in row.file_sha256:
             if not (base / name).is_file():
                 raise HeadError(f"{base / name}: a file of {row.subject}/{row.expression} is gone; {_AGAIN}")
-            if file_sha256(base / name) != sha256:
+            if name not in self._sha256:
+                self._sha256[name] = file_sha256(base / name)
+            if self._sha256[name] != sha256:
                 raise HeadError(
                     f"{base / name}: was changed after the build (SHA-256 differs); replay needs the "
                     "file as it was"
@@ -81,5 +84,6 @@ class RecordedHeads:
             forward=wanted.forward,
             eye_distance_mm=wanted.eye_distance_mm,
             without=wanted.without,
+            head_object=wanted.head_object,
         )
         return {(head.subject, head.expression): head for head in source.heads}

@@ -223,9 +223,9 @@ class _Studio:
         if factor and factor not in FACTORS:
             raise DatasetError(f"{self._root}: there is no factor {quoted(factor)}; see `headturn verify`")
         if factor:
-            views = plan_twins(config, head.name, row.radius_mm, poses, factor)
+            views = plan_twins(config, head.name, row.radius_mm, poses, factor, row.own_camera)
         else:
-            views = plan_views(config, head.name, row.radius_mm, poses)
+            views = plan_views(config, head.name, row.radius_mm, poses, row.own_camera)
         root = self._scratch / unit
         root.mkdir()
         order = build_order(head, _placement(row), points, row.split, views, indices, config, root)
@@ -284,4 +284,5 @@ def _placement(row: HeadRow) -> Placement:
         frame=row.frame,
         correction=row.correction,
         correction_sd_deg=row.correction_sd_deg,
+        scene_camera=row.own_camera,
     )

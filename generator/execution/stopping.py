@@ -11,7 +11,9 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+from generator.platforms import HERE
+
+SIGNALS = [getattr(signal, name) for name in HERE.ending if hasattr(signal, name)]
 
 AGAIN_S = 0.02
 PATIENCE = 500

@@ -19,15 +19,18 @@ Projection = Literal["perspective", "orthographic"]
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that looks along +z of frame C at the head's pivot.
+    """A camera that looks along +z of frame C, at the head's pivot or past it.
 
-    width, height: of the image in pixels, which are square.
+    width, height: of the image in pixels.
     lens_mm: focal length for a sensor 36 mm wide.
-    distance_mm: from the optical centre to the pivot of the rotation.
+    distance_mm: from the optical centre to the pivot of the rotation, along z.
     projection: "perspective" divides by a point's own depth, "orthographic" by
         the pivot's: all rays are parallel, and the scale is the one that the
         perspective camera has at the pivot.
     principal_px: (x, y) of the optical axis, pixels; None is the middle of the image.
+    aside_mm: (x, y) of the pivot in frame C, where it is not on the axis.
+    pixel_aspect: height of a pixel over its width.
+    of_scene: it is the camera of the head's own Blender scene.
     """
 
     width: int
@@ -36,6 +39,9 @@ class Camera:
     distance_mm: float
     projection: Projection = "perspective"
     principal_px: tuple[float, float] | None = None
+    aside_mm: tuple[float, float] = (0.0, 0.0)
+    pixel_aspect: float = 1.0
+    of_scene: bool = False
 
     @classmethod
     def square(
@@ -46,8 +52,13 @@ class Camera:
 
     @property
     def focal_px(self) -> float:
-        """Focal length in pixels."""
+        """Focal length in widths of a pixel."""
         return self.width * self.lens_mm / SENSOR_MM
+
+    @property
+    def focal_xy(self) -> np.ndarray:
+        """Focal length in pixels, along x and along y, float64 [2]."""
+        return np.array([self.focal_px, self.focal_px / self.pixel_aspect])
 
     @property
     def view_mm(self) -> float:
@@ -62,19 +73,19 @@ class Camera:
     @property
     def matrix(self) -> np.ndarray:
         """K, float64 [3, 3], pixels. Pixel (i, j) covers [j, j+1) x [i, i+1): centres at +0.5."""
-        x, y = self.centre_px
-        return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1.0]])
+        (x, y), (across, down) = self.centre_px, self.focal_xy
+        return np.array([[across, 0, x], [0, down, y], [0, 0, 1.0]])
 
     @property
     def translation_mm(self) -> np.ndarray:
         """The pivot in frame C, float64 [3], mm."""
-        return np.array([0.0, 0.0, self.distance_mm])
+        return np.array([*self.aside_mm, self.distance_mm])
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
         """Pixels of points in frame C. float [..., 3] mm -> float64 [..., 2] (x, y)."""
         points = np.asarray(points_mm, dtype=np.float64)
         depth = points[..., 2:] if self.projection == "perspective" else self.distance_mm
-        return points[..., :2] / depth * self.focal_px + self.centre_px
+        return points[..., :2] / depth * self.focal_xy + self.centre_px
 
     def holds(self, pixels: np.ndarray) -> np.ndarray:
         """Which pixels lie in the image. float [..., 2] -> bool [...]."""
@@ -85,7 +96,7 @@ class Camera:
 
         float [..., 2] -> float64 [..., 3] twice.
         """
-        centred = (np.asarray(pixels, dtype=np.float64) - self.centre_px) / self.focal_px
+        centred = (np.asarray(pixels, dtype=np.float64) - self.centre_px) / self.focal_xy
         ones = np.ones_like(centred[..., :1])
         if self.projection == "perspective":
             return np.zeros((*centred.shape[:-1], 3)), np.concatenate([centred, ones], axis=-1)

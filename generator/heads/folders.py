@@ -14,7 +14,7 @@ from generator.heads.card import CARD_NAME, HeadCard, read_card
 from generator.heads.collada import collada_files
 from generator.heads.fbx import check_fbx
 from generator.heads.gltf_file import gltf_files
-from generator.heads.head import NEUTRAL, Finder, Head, SkippedHead
+from generator.heads.head import NEUTRAL, SCENE_SUFFIX, Finder, Head, SkippedHead
 from generator.heads.obj import obj_files
 from generator.heads.paths import check_name, find_inside, natural_key
 from generator.heads.ply import ply_textures
@@ -23,7 +23,7 @@ SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".vrm", ".fbx", ".dae", *usd.SUFFIX
 """Where one head comes in several formats, the first of these is read."""
 
 UNREAD = {
-    **dict.fromkeys((".blend", ".abc", ".x3d"), "in Blender"),
+    **dict.fromkeys((SCENE_SUFFIX, ".abc", ".x3d"), "in Blender"),
     **dict.fromkeys((".3ds", ".wrl", ".max", ".ma", ".mb", ".c4d"), "in the program that wrote it"),
 }
 """Other formats of meshes, and where such a file is opened. Some name further files, anywhere: Blender, whose
@@ -118,6 +118,8 @@ def _is_unpacked(folder: Path, stem: str, stems: set[str]) -> bool:
 
 def _unread(name: str) -> str:
     suffix = Path(name).suffix.lower()
+    if suffix == SCENE_SUFFIX:
+        return f"{name} is a scene, and a source of its own: headturn build {name}"
     return f"{suffix[1:].upper()} is not read; open the file {UNREAD[suffix]} and export it as GLB"
 
 

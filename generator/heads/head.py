@@ -9,6 +9,16 @@ from pathlib import Path
 
 NEUTRAL = "neutral"
 
+SCENE = "blend"
+"""The source of a head in a Blender scene."""
+
+SCENE_SUFFIX = ".blend"
+
+
+def is_scene(path: str | Path) -> bool:
+    """Whether it is the path of a Blender scene, by its ending."""
+    return Path(path).suffix.lower() == SCENE_SUFFIX
+
 
 @dataclass(frozen=True)
 class Head:
@@ -16,7 +26,7 @@ class Head:
 
     subject, expression: identity as strings, never a path; expression is
         "neutral" where the source has only one mesh a subject.
-    source: "parametric", "facescape" or "mesh".
+    source: "parametric", "facescape", "mesh" or SCENE.
     mesh_path: the mesh file. files: every file that decides the result,
         mesh first, then materials and textures.
     license: SPDX id or the source's own words; "unknown" if it says nothing.
@@ -26,6 +36,8 @@ class Head:
     problems: what is wrong but does not stop the head from being built.
     eye_distance_mm: between the outer eye corners, where it decides the scale; see
         :func:`generator.heads.units.scale_of`. without: materials that are left out.
+    head_object, shape_key: of a Blender scene, the object or collection that is the head, and the shape key
+        that makes the expression; "" for the scene as it stands.
     """
 
     subject: str
@@ -42,6 +54,8 @@ class Head:
     problems: tuple[str, ...] = ()
     eye_distance_mm: float | None = None
     without: tuple[str, ...] = ()
+    head_object: str = ""
+    shape_key: str = ""
 
     @property
     def name(self) -> str:
@@ -76,10 +90,12 @@ class Finder:
     find: what lies under a path: heads, and what cannot be given with its reason; neither where it is
         no such source. Meshes are not parsed.
     license: of all its heads, where that is fixed.
+    choose: as find, where the user may name what of a path is the head; None where there is nothing to name.
     """
 
     find: Callable[[Path], tuple[list[Head], list[SkippedHead]]]
     license: str = ""
+    choose: Callable[[Path, str], tuple[list[Head], list[SkippedHead]]] | None = None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import HeadError
+from generator.heads.scene import BlendScene
 from generator.heads.tiling import EXTEND
 from generator.labels import SKIN
 
@@ -55,6 +56,7 @@ class HeadMesh:
     openness         float32 [V] 0-1, the light from everywhere that reaches a vertex; None where nobody
                      asked, see generator.landmarks.occlusion
     problems         what the reader noticed and could work around, a line each
+    scene            where it stands in the Blender scene that it was read from; None for any other
     """
 
     vertices: np.ndarray
@@ -65,6 +67,7 @@ class HeadMesh:
     materials: tuple[Material, ...]
     problems: tuple[str, ...] = ()
     openness: np.ndarray | None = None
+    scene: BlendScene | None = None
 
     def __post_init__(self) -> None:
         count, faces = len(self.vertices), len(self.triangles)

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from generator.codec import from_plain, to_plain
 from generator.heads.mesh import HeadMesh, Material
+from generator.heads.scene import BlendScene
 
 
 def save_package(mesh: HeadMesh, path: Path) -> None:
@@ -45,6 +47,10 @@ def save_package(mesh: HeadMesh, path: Path) -> None:
         arrays["vertex_colors"] = mesh.vertex_colors
     if mesh.openness is not None:
         arrays["openness"] = mesh.openness
+    if mesh.problems:
+        arrays["problems"] = np.array(json.dumps(mesh.problems))
+    if mesh.scene is not None:
+        arrays["scene"] = np.array(json.dumps(to_plain(mesh.scene)))
     np.savez(path, **arrays)
 
 
@@ -78,4 +84,6 @@ def load_package(path: Path) -> HeadMesh:
             material_index=data["material_index"],
             materials=materials,
             openness=data["openness"] if "openness" in data else None,
+            problems=tuple(json.loads(str(data["problems"]))) if "problems" in data else (),
+            scene=from_plain(BlendScene, json.loads(str(data["scene"]))) if "scene" in data else None,
         )

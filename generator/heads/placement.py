@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from generator.geometry.scene_camera import SceneCamera
 from generator.heads.mesh import HeadMesh
 from generator.heads.units import axes_rotation
 
@@ -23,7 +24,8 @@ class Placement:
     eye_distance_mm: between the outer eye corners. notes: what was guessed.
     frame: "source", "level" or "canonical". correction, correction_sd_deg: of HeadRow; applied by
     :meth:`normalise` only where frame is not "source". turned_deg: yaw, pitch and roll of the face at
-    pose zero of the source's axes, where it does not look along them.
+    pose zero of the source's axes, where it does not look along them. scene_camera: of the Blender scene
+    that the head is in, with where it sees the pivot; no_camera: why there is none that can be used.
     """
 
     units: str
@@ -38,6 +40,8 @@ class Placement:
     correction: tuple[float, ...] = IDENTITY
     correction_sd_deg: tuple[float, ...] = (float("nan"),) * 3
     turned_deg: tuple[float, ...] = STRAIGHT
+    scene_camera: SceneCamera | None = None
+    no_camera: str = ""
 
     @property
     def levelling(self) -> np.ndarray:
@@ -46,6 +50,8 @@ class Placement:
 
     def normalise(self, mesh: HeadMesh) -> HeadMesh:
         """The mesh in frame U at the chosen pose zero, mm, pivot at the origin."""
-        centred = (mesh.vertices - np.array(self.pivot)) * self.mm_per_unit
+        pivot = np.array(self.pivot)
+        centred = (mesh.vertices - pivot) * self.mm_per_unit
         rotation = self.levelling @ axes_rotation(self.up, self.forward)
-        return replace(mesh, vertices=centred @ rotation.T)
+        scene = mesh.scene and mesh.scene.moved(rotation, pivot, self.mm_per_unit)
+        return replace(mesh, vertices=centred @ rotation.T, scene=scene)

@@ -9,11 +9,12 @@ from pathlib import Path
 from generator.errors import HeadError
 from generator.escape import printable
 from generator.heads import usd
+from generator.heads.blend import read_scene
 from generator.heads.collada import read_collada
 from generator.heads.eyeballs import add_eyeballs
 from generator.heads.fbx import check_fbx
 from generator.heads.gltf import read_gltf
-from generator.heads.head import Head
+from generator.heads.head import SCENE, Head
 from generator.heads.limits import check_mesh_file
 from generator.heads.mesh import HeadMesh
 from generator.heads.obj import read_obj
@@ -22,8 +23,9 @@ from generator.heads.stl import read_stl
 from generator.heads.surroundings import without_materials
 from generator.heads.weld import weld
 
-ImportWithBlender = Callable[[Path, Path], Path]
-"""(mesh file, scratch folder) -> the GLB that Blender made of it."""
+ImportWithBlender = Callable[..., Path]
+"""(mesh file, scratch folder) -> the GLB that Blender made of it; (.blend, scratch folder, head object, shape
+key) -> the package."""
 
 
 def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlender | None = None) -> HeadMesh:
@@ -45,6 +47,8 @@ def read_mesh(head: Head, scratch: Path, *, import_with_blender: ImportWithBlend
     """
     path = head.mesh_path
     try:
+        if head.source == SCENE:
+            return weld(read_scene(head, scratch, import_with_blender))
         check_mesh_file(path)
         if head.source == "facescape":
             mesh = add_eyeballs(weld(read_obj(path, scratch, texture=head.files[-1])), scratch)

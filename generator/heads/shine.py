@@ -16,6 +16,10 @@ Kind = float | str
 """What decides a gloss: a material's own, or the class that it is of."""
 
 
+Kinds = tuple[Kind, ...]
+"""Those of all materials of a mesh, each once."""
+
+
 def is_skin(material: Material) -> bool:
     """Is it a head's skin, all or some of it?"""
     return material.label not in WORN and named(material.name) == SKIN

@@ -13,7 +13,7 @@ from generator.errors import HeadError, UsageError
 from generator.escape import quoted
 from generator.heads.facescape import EXPRESSIONS, expression_number
 from generator.heads.folders import ARCHIVES, SUFFIXES, UNKNOWN_LICENSE
-from generator.heads.head import Finder, Head, HeadSource, SkippedHead
+from generator.heads.head import SCENE, Finder, Head, HeadSource, SkippedHead
 from generator.heads.units import MM_PER_UNIT, axes_rotation, axis_vector
 from generator.names import is_text
 
@@ -29,6 +29,7 @@ def find_heads(
     forward: str | None = None,
     eye_distance_mm: float | None = None,
     without: Sequence[str] | None = None,
+    head_object: str | None = None,
 ) -> HeadSource:
     """The heads under ``path``, numbers in numerical order. Meshes are not parsed.
 
@@ -41,6 +42,7 @@ def find_heads(
     license, redistributable, units, up, forward: override what the source says
         or what would be guessed. FaceScape's licence cannot be overridden.
     eye_distance_mm, without: of every head; see :class:`Head`.
+    head_object: which object or collection of a Blender scene is the head.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def find_heads(
     if up is not None and forward is not None:
         axes_rotation(up, forward)
     try:
-        kind, finder, heads, skipped = _search(path)
+        kind, finder, heads, skipped = _search(path, head_object)
     except (HeadError, OSError) as error:
         raise UsageError(f"{path} cannot be searched: {error}") from error
     if not heads and not skipped:
@@ -72,6 +74,8 @@ def find_heads(
             f"{path} is {kind}, whose licence is {finder.license}; remove --license and --redistributable"
         )
     heads, skipped = _recordable(heads, skipped)
+    if without and any(head.source == SCENE for head in heads):
+        raise UsageError(f"{path}: a scene is rendered as it stands; hide in Blender what --without names")
     if expressions is not None:
         heads, skipped = _select(heads, skipped, expressions)
     given = [
@@ -126,13 +130,15 @@ def _plain(name: str) -> str:
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
-def _search(path: Path) -> tuple[str, Finder, list[Head], list[SkippedHead]]:
+def _search(path: Path, head_object: str | None) -> tuple[str, Finder, list[Head], list[SkippedHead]]:
     """The first kind of source that finds something, and what it finds; else the last kind."""
     for kind in registries.HEAD_FINDERS:
         finder: Finder = registries.HEAD_FINDERS.get(kind)
-        heads, skipped = finder.find(path)
+        heads, skipped = finder.choose(path, head_object or "") if finder.choose else finder.find(path)
         if heads or skipped:
             break
+    if head_object and not finder.choose:
+        raise UsageError(f"{path} is no Blender scene, so there is nothing to choose; remove --head-object")
     sources = {head.source for head in heads}
     return (sources.pop() if len(sources) == 1 else kind), finder, heads, skipped
 

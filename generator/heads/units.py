@@ -16,9 +16,12 @@ OUTER_EYE_DISTANCE_MM = (60.0, 130.0)
 """Between the outer eye corners: about 90 mm in adults, with room for children and stylised heads.
 The window spans a factor of 2.2, so that no distance fits two units, which are at least 10 apart."""
 
+BLENDER_AXES = ("+Z", "-Y")
+"""(up, forward) of a head that was made in Blender."""
+
 CANDIDATE_AXES = (
     ("+Y", "+Z"),  # FaceScape, FLAME, MakeHuman, glTF
-    ("+Z", "-Y"),  # Blender, and Z-up CAD and scanner exports
+    BLENDER_AXES,  # and Z-up CAD and scanner exports
     ("+Z", "+Y"),
     ("+Y", "-Z"),
     ("+Y", "+X"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from generator.errors import WorkerError
 from generator.landmarks.topology import FACE_MESH
+from litert_faces.installing import install_command
 
 # Must be set before the first import: keeps TensorFlow Lite's start-up notes out of the log.
 os.environ.setdefault("GLOG_minloglevel", "2")
@@ -30,7 +31,7 @@ class MediaPipeFaceMesh:
             from mediapipe.python.solutions.face_mesh import FaceMesh
         except ImportError as error:
             raise WorkerError(
-                f"MediaPipe Face Mesh cannot be loaded ({error}): pip install 'headturn[build]'"
+                f"MediaPipe Face Mesh cannot be loaded ({error}): {install_command('build')}"
             ) from error
         self.name = f"mediapipe-face-mesh {version('mediapipe')}"
         self._mesh = FaceMesh(

@@ -14,6 +14,9 @@ from generator.picture.develop import to_linear
 COARSEST, OCTAVES = 2, 5
 """Cells across of the coarsest noise, and how often they are halved."""
 
+SMALL = 64
+"""Pixels that noise is made of along a side, at least."""
+
 
 def seen_panorama(
     panorama: np.ndarray, camera: Camera, turn_deg: float, scale: float = 1.0, most: float = math.inf
@@ -52,16 +55,19 @@ def noise(camera: Camera, seed: int) -> np.ndarray:
     """Smooth random colours, the same for the same seed: noise of several scales, coarse ones stronger."""
     rng = np.random.default_rng(seed)
     size = (camera.width, camera.height)
+    # Smooth as it is, it is made of fewer pixels, of which the finest cells have two.
+    small = tuple(min(side, max(SMALL, math.ceil(side / 4))) for side in size)
     base = rng.uniform(0.1, 0.9) + rng.uniform(-0.1, 0.1, 3)
-    display = np.broadcast_to(base.astype(np.float32), (*size[::-1], 3))
+    display = np.broadcast_to(base.astype(np.float32), (*small[::-1], 3))
     for octave in range(OCTAVES):
         cells = COARSEST * 2**octave + 3  # cubic interpolation needs a rim
         coarse = rng.standard_normal((cells, cells, 3)).astype(np.float32)
         # Colours that differ less than brightness does, as in the world.
         coarse = np.float32(0.2) * coarse + np.float32(0.8) * coarse.mean(axis=-1, keepdims=True)
         coarse *= 0.13 / 1.6**octave
-        display = display + cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
-    return to_linear(np.rint(np.clip(display, 0, 1) * 255).astype(np.uint8))
+        display = display + cv2.resize(coarse, small, interpolation=cv2.INTER_CUBIC)
+    whole = cv2.resize(display, size, interpolation=cv2.INTER_CUBIC)
+    return to_linear(np.rint(np.clip(whole, 0, 1) * 255).astype(np.uint8))
 
 
 def filling(picture: np.ndarray, camera: Camera) -> np.ndarray:
@@ -80,5 +86,5 @@ def before(head: np.ndarray, backdrop: np.ndarray) -> np.ndarray:
 
     head: float32 [H, W, 4], RGB multiplied by alpha: where half of a pixel is head, half of it is backdrop.
     """
-    light: np.ndarray = head[..., :3] + (1 - head[..., 3:]) * backdrop
-    return light
+    own = cv2.cvtColor(head, cv2.COLOR_RGBA2RGB)
+    return cv2.add(own, cv2.merge([1 - head[..., 3]] * 3) * backdrop)

@@ -13,6 +13,7 @@ import numpy as np
 
 from generator.errors import HeadError, UsageError
 from generator.picture import backdrop
+from generator.picture.develop import to_linear
 from generator.picture.files import (
     PANORAMAS,
     PICTURES,
@@ -79,11 +80,18 @@ class Scenery:
             panorama = self._panorama(light.file)
             return backdrop.seen_panorama(panorama, camera, light.turn_deg, light.scale, WHITE)
         plain = np.array(look.background, np.float32)  # no environment was drawn that could be seen
-        return np.broadcast_to(backdrop.to_linear(plain), (camera.height, camera.width, 3))
+        return np.broadcast_to(to_linear(plain), (camera.height, camera.width, 3))
 
-    def composed(self, head: np.ndarray, view: View) -> np.ndarray:
-        """A rendered head before its backdrop, float32 [H, W, 3], linear. head: as for backdrop.before."""
-        return backdrop.before(head.astype(np.float32), self.behind(view))
+    def composed(self, head: np.ndarray, corner: tuple[int, int], view: View) -> np.ndarray:
+        """A rendered head before its backdrop, float32 [H, W, 3], linear.
+
+        head: of some pixels, as for backdrop.before. corner: column and row of its upper left.
+        """
+        whole = np.array(self.behind(view))
+        left, top = corner
+        there = whole[top : top + head.shape[0], left : left + head.shape[1]]
+        there[...] = backdrop.before(head.astype(np.float32), there)
+        return whole
 
     def _light(self, look: Look) -> EnvironmentLight | None:
         if look.environment == NOTHING:

@@ -101,7 +101,7 @@ def anchor_head(
     mesh: as read. The anchors' points are about the pivot, in the mesh's own axes
     (frame C at pose zero of frame = "source").
     """
-    placed = replace(placement, frame="source").normalise(head_alone(mesh, placement))
+    placed = replace(placement, frame="source").normalise(head_alone(replace(mesh, scene=None), placement))
     camera = anchor_camera(placement.eye_distance_mm)
     views = anchor_views(placed, camera, renderer, detector, scratch, placement.turned_deg)
     if not views:

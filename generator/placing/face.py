@@ -22,11 +22,11 @@ from generator.geometry.rotation import (
     geodesic_deg,
     graphics_rotation,
 )
-from generator.heads.head import Head
+from generator.heads.head import SCENE, Head
 from generator.heads.mesh import HeadMesh
 from generator.heads.placement import Placement
 from generator.heads.surroundings import clusters, surroundings
-from generator.heads.units import CANDIDATE_AXES, axes_rotation, scale_of
+from generator.heads.units import BLENDER_AXES, CANDIDATE_AXES, axes_rotation, scale_of
 from generator.placing.around import Sight, find_around
 from generator.placing.looking import MAX_RESIDUAL, Eyes, Face, look
 
@@ -201,6 +201,8 @@ def _measure(
         eye_distance_mm=round(width * scale, 2),
         notes=tuple(notes),
         turned_deg=turned_deg or (0.0, 0.0, 0.0),
+        scene_camera=mesh.scene.seen_pivot(in_source_axes, scale) if mesh.scene else None,
+        no_camera=mesh.scene.no_camera if mesh.scene else "",
     )
 
 
@@ -210,9 +212,10 @@ def _axes_of(head: Head) -> list[Axes]:
         return [(head.up, head.forward)]
     signed = [sign + axis for axis in "XYZ" for sign in "+-"]
     others = [(u, f) for u, f in permutations(signed, 2) if u[1] != f[1] and (u, f) not in CANDIDATE_AXES]
+    blenders = [BLENDER_AXES] if head.source == SCENE else []
     return [
         (up, forward)
-        for up, forward in (*CANDIDATE_AXES, *others)
+        for up, forward in dict.fromkeys((*blenders, *CANDIDATE_AXES, *others))
         if head.up in (None, up) and head.forward in (None, forward)
     ]
 

@@ -86,7 +86,7 @@ def look(
     closely: find its turn, too.
     """
     mm = 300.0 / side
-    seen = replace(mesh, vertices=(mesh.vertices - centre) * mm)
+    seen = replace(mesh, vertices=(mesh.vertices - centre) * mm, scene=None)
     # From outside everything: nothing of the mesh may lie behind the camera.
     distance = max(150.0 * LENS_MM / 18.0, float(seen.vertices[:, 2].max()) * 1.1)
     camera = Camera.square(PIXELS, LENS_MM, distance)

@@ -25,7 +25,7 @@ from generator.plan.distribution import (
     parse_distribution,
 )
 from generator.plan.head_source import is_made, split_path
-from generator.plan.setting import Choice
+from generator.plan.setting import Choice, Setting
 from generator.plan.settings import (
     SECTIONS,
     Dataset,
@@ -33,7 +33,6 @@ from generator.plan.settings import (
     Landmarks,
     Poses,
     Render,
-    Setting,
     Values,
     all_settings,
     plain,

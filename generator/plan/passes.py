@@ -91,7 +91,7 @@ OBJECT_INDEX = Pass(
     ("IndexOB", "Object Index"),
     ("X",),
     (("X", "V"),),
-    "1 on the head, 2 on what it wears, 0 where there is nothing",
+    "1 on the head, 2 on what it wears, 3 on the rest of a Blender scene, 0 where there is nothing",
     empty=0.0,
 )
 """Always rendered: where it is 0 there is no surface."""

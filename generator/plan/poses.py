@@ -268,7 +268,7 @@ def _angle(where: str, name: str, cell: str | None) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise UsageError(f"{where}: {name} is {cell or ''!r}, expected a finite number of degrees")
-    return value + 0.0
+    return value
 
 
 def _index(where: str, name: str, cell: str | None) -> int:

@@ -11,8 +11,12 @@ from generator.plan.shading import Shading
 from generator.plan.variety import CHOICES, NONE
 from generator.plan.wear import Wear
 
-PRESET_SAMPLES = {"fast": 1, "quality": 4}
-"""Cycles samples a pixel of each preset, where none are asked for."""
+PRESET_SAMPLES = {"fast": 1, "quality": 1}
+"""Cycles samples a pixel of each preset, where none are asked for. One, denoised, moves landmarks less than
+four that are not, in less time: benchmarks/quality.py."""
+
+MANY_SAMPLES = 64
+"""Of so many, path tracing leaves little noise, and a denoiser would take the skin's relief with it."""
 
 Projection = Literal["perspective", "orthographic"]
 
@@ -30,7 +34,7 @@ class Lens:
     """From where an image is taken."""
 
     variety: str = setting(
-        NONE, "What settings that are not given are drawn from, image by image", choices=CHOICES,
+        NONE, "Distributions of the settings that you do not give, drawn for every image", choices=CHOICES,
         label="Variety", content=False,
     )  # fmt: skip
 
@@ -53,7 +57,7 @@ class Lens:
         unit="mm", low=100, high=100_000, label="Distance", varies=True,
     )  # fmt: skip
     margin: float = setting(
-        1.05, "Room around a head that is framed; 1 touches the border", low=0.5, high=10, label="Margin",
+        1.05, "Room around a framed head; 1 touches the border", low=0.5, high=10, label="Margin",
         varies=True,
     )  # fmt: skip
     zoom: bool = setting(
@@ -69,9 +73,12 @@ class Lens:
         low=-1, high=1, label="Shift right", varies=True,
     )  # fmt: skip
     shift_y: float = setting(
-        0.0, "How far below the middle it is, in heights of the image",
+        0.0, "How far below the middle the head's pivot is, in heights of the image",
         low=-1, high=1, label="Shift down", varies=True,
     )  # fmt: skip
+    scene_camera: bool = setting(
+        False, "See the head of a Blender scene through the scene's own camera, from where it stands"
+    )
 
 
 NO_JPEG = 100.0
@@ -102,11 +109,11 @@ class Sensor:
         flag="--motion", varies=True,
     )  # fmt: skip
     motion_deg: float = setting(
-        0.0, "Direction of that streak: 0 is to the right, 90 is up", unit="degrees", low=-180, high=180,
+        0.0, "Direction of the streak: 0 is to the right, 90 is up", unit="degrees", low=-180, high=180,
         flag="--motion-direction", label="Direction", varies=True,
     )  # fmt: skip
     detail: float = setting(
-        1.0, "Share of the pixels' number along each side that the sensor has", low=0.05, high=1,
+        1.0, "Resolution of the sensor, as a share of the image's pixels along each side", low=0.05, high=1,
         label="Detail", varies=True,
     )  # fmt: skip
     noise: float = setting(
@@ -114,7 +121,7 @@ class Sensor:
         label="Noise", varies=True,
     )  # fmt: skip
     jpeg: float = setting(
-        NO_JPEG, "Quality of a JPEG that the image went through; 100 is none", low=1, high=100,
+        NO_JPEG, "Quality of a JPEG that the camera makes of the image; 100 is no JPEG", low=1, high=100,
         label="JPEG quality", varies=True,
     )  # fmt: skip
 
@@ -132,12 +139,12 @@ class Look(Wear, Shading, Sensor):
         "fast", "How light is computed",
         choices=(
             Choice("fast", "Light computed from the normal: no noise, quick"),
-            Choice("quality", "Path traced, soft shadows"),
+            Choice("quality", "Path traced, soft shadows; denoised below 64 samples"),
         ),
         label="Look",
     )  # fmt: skip
     samples: int | None = setting(
-        None, "Cycles samples a pixel; the preset's own where it is not given", low=1, high=4096,
+        None, "Cycles samples a pixel; without it those of the preset", low=1, high=4096,
         label="Samples",
     )  # fmt: skip
     light_yaw_deg: float = setting(
@@ -149,37 +156,39 @@ class Look(Wear, Shading, Sensor):
         unit="degrees", low=-90, high=90, flag="--light", label="Light pitch", varies=True,
     )  # fmt: skip
     ambient: float = setting(
-        0.35, "Share of the light that comes from everywhere", low=0, high=1, label="Ambient", varies=True
+        0.35, "Share of the light that comes from all sides", low=0, high=1, label="Ambient", varies=True
     )
     background: tuple[float, float, float] = setting(
-        (0.5, 0.5, 0.5), "R,G,B of what is behind the head, sRGB between 0 and 1", low=0, high=1,
+        (0.5, 0.5, 0.5), "Colour behind the head: R,G,B in sRGB, between 0 and 1", low=0, high=1,
         label="Background", varies=True, since="1.3.0",
     )  # fmt: skip
     environment: str = setting(
-        NOTHING, "Which high-dynamic-range panorama lights the head, by its name: one of Blender's, or of "
+        NOTHING, "High-dynamic-range panorama that lights the head, by its name: one of Blender's, or of "
         "--environments; all draws from every one",
         label="Environment", varies=True,
     )  # fmt: skip
     environment_yaw_deg: float = setting(
-        0.0, "How far it is turned; at 0 its middle is behind the head, above zero it moves to image right",
+        0.0, "How far the environment is turned; at 0 its middle is behind the head, above zero it moves to "
+        "image right",
         unit="degrees", low=-180, high=180, flag="--environment-yaw", label="Environment yaw", varies=True,
     )  # fmt: skip
     environment_strength: float = setting(
-        1.0, "Its light; at 1 a face towards the camera is lit to its own colours, whichever it is",
+        1.0, "Strength of the environment; at 1 a face towards the camera has its own colours",
         low=0, high=100, label="Environment strength", varies=True,
     )  # fmt: skip
     environment_key: float = setting(
-        0.0, "Strength of the key light beside an environment; without one it is what ambient leaves",
+        0.0, "Strength of the key light beside an environment; without an environment it has what ambient "
+        "leaves",
         low=0, high=10, label="Key beside it", varies=True,
     )  # fmt: skip
     backdrop: str = setting(
-        PLAIN, "What is behind the head: plain, the colour of --background; environment, as the camera sees "
+        PLAIN, "Picture behind the head: plain, the colour of --background; environment, as the camera sees "
         "it; noise, smooth random colours; picture, one of --pictures",
         label="Backdrop", varies=True,
     )  # fmt: skip
     backdrop_picture: str = setting(
         "",
-        "Which of --pictures is behind the head, by its name; by default it is drawn from all",
+        "Which of --pictures is behind the head, by its name; without it one is drawn from all",
         varies=True,
     )
 
@@ -189,12 +198,17 @@ class Look(Wear, Shading, Sensor):
         return self.samples or PRESET_SAMPLES[self.preset]
 
 
+def is_denoised(look: Look) -> bool:
+    """Is noise of path tracing taken out of the images of a look? Their alpha is left as it was sampled."""
+    return look.preset == "quality" and look.cycles_samples < MANY_SAMPLES
+
+
 @dataclass(frozen=True)
 class Files:
     """Where the files of environments and backdrops are."""
 
     environments: str | None = setting(
-        None, "Folder of panoramas, .exr or .hdr; those of Blender where it is not given", content=False,
+        None, "Folder of panoramas, .exr or .hdr; without it those of Blender", content=False,
         path=True,
     )  # fmt: skip
     pictures: str | None = setting(
@@ -205,7 +219,7 @@ class Files:
         content=False, path=True,
     )  # fmt: skip
     files_sha256: str = setting(
-        "", "SHA-256 of the names and bytes of those that are used; a build finds it", flag=""
+        "", "SHA-256 of the names and bytes of the files that are used; a build computes it", flag=""
     )
 
 

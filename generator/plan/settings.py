@@ -58,10 +58,12 @@ class Heads:
         None, "Only this expression; repeatable",
         flag="--expression", label="Expressions", grows=True,
     )  # fmt: skip
-    license: str | None = setting(None, "Licence of heads that do not say")
-    redistributable: bool | None = setting(None, "May renders of heads that do not say be published?")
+    license: str | None = setting(None, "Licence of heads that name none", label="Licence")
+    redistributable: bool | None = setting(
+        None, "May renders of heads that do not say so be published?", label="Redistributable"
+    )
     units: str | None = setting(
-        None, "Unit of the meshes; found from the size of the face where it is not given",
+        None, "Unit of the meshes; without it the size of the face decides",
         choices=(
             Choice("um", label="Micrometres"), Choice("mm", label="Millimetres"),
             Choice("cm", label="Centimetres"), Choice("dm", label="Decimetres"), Choice("m", label="Metres"),
@@ -69,20 +71,22 @@ class Heads:
         label="Units",
     )  # fmt: skip
     eye_distance_mm: float | None = setting(
-        None, "Between the outer eye corners of meshes that are in no unit; such meshes get 90 mm where it "
-        "is not given",
+        None, "Distance of the outer eye corners of meshes that are in no unit; without it 90 mm",
         unit="mm", low=20, high=500, label="Eye distance",
     )  # fmt: skip
     without: tuple[str, ...] | None = setting(
         None,
-        "Leave out what has this material, such as lash cards; repeatable",
+        "Leave out the triangles of this material, such as lash cards; repeatable",
+    )
+    head_object: str | None = setting(
+        None, "The object or collection of a Blender scene that is the head, with all that is parented to it"
     )
     up: str | None = setting(
-        None, "Axis of the meshes' crown, such as +Y; found from the face where it is not given",
+        None, "Axis of the meshes' crown, such as +Y; without it the face decides",
         choices=_AXES, label="Up",
     )  # fmt: skip
     forward: str | None = setting(
-        None, "Axis of the meshes' nose, such as +Z; found from the face where it is not given",
+        None, "Axis of the meshes' nose, such as +Z; without it the face decides",
         choices=_AXES, label="Forward",
     )  # fmt: skip
 
@@ -115,7 +119,7 @@ class Poses:
     )  # fmt: skip
     count: int = setting(
         693,
-        "Random poses a head",
+        "Random poses for each head",
         low=1,
         high=MAX_POSES,
         flag="--poses",
@@ -149,7 +153,7 @@ class Landmarks:
     """Who finds the landmarks."""
 
     detector: str = setting(
-        "mediapipe", "Which detector; further ones after commas, each with a column of its own",
+        "mediapipe", "The detector; further ones after commas, each with a column of its own",
         choices=_registered(registries.DETECTORS),
     )  # fmt: skip
     also: tuple[str, ...] = setting(
@@ -162,7 +166,7 @@ class Landmarks:
         flag="--detector-file", path=True, content=False,
     )  # fmt: skip
     min_confidence: float = setting(
-        0.5, "How sure the detector must be that there is a face", above=0, high=1,
+        0.5, "Lowest score at which the detector reports a face", above=0, high=1,
         label="Min. confidence",
     )  # fmt: skip
 
@@ -181,12 +185,12 @@ class Dataset:
         label="Images",
     )  # fmt: skip
     image_format: str = setting(
-        "png", "Of the images",
+        "png", "Format of the images",
         choices=(Choice("png", "Exact", label="PNG"), Choice("jpg", "Smaller", label="JPEG")),
         label="Format",
     )  # fmt: skip
     passes: tuple[str, ...] = setting(
-        (), "OpenEXR passes, with commas", choices=_registered(registries.PASSES)
+        (), "OpenEXR passes, with commas", choices=_registered(registries.PASSES), label="Passes"
     )
     validation: float = setting(
         0.0, "Share of the subjects that go to the validation split", low=0, high=1, label="Validation",
@@ -200,7 +204,7 @@ class Dataset:
         1.0, "Share of the rows that get a twin of each factor", low=0, high=1, grows=True, content=False
     )
     unit_size: int = setting(
-        100, "Poses that are rendered and written together", low=1, high=100_000, content=False
+        50, "Poses that are rendered and written together", low=1, high=100_000, content=False
     )
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
@@ -24,8 +23,9 @@ class Lamp:
 
 def _yaw(lamp: int, default: float) -> float:
     return setting(
-        default, f"Where lamp {lamp} stands, as the key light", unit="degrees", low=-180, high=180,
-        flag=f"--lamp{lamp}", label=f"Lamp {lamp} yaw", varies=True, since="1.3.0",
+        default, f"Where lamp {lamp} stands, in the angles of the key light",
+        unit="degrees", low=-180, high=180, flag=f"--lamp{lamp}", label=f"Lamp {lamp} yaw", varies=True,
+        since="1.3.0",
     )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def _pitch(lamp: int, default: float) -> float:
 
 def _strength(lamp: int) -> float:
     return setting(
-        0.0, f"Strength of lamp {lamp}: at 1 it lights what faces it to its own colour; at 0 there is none",
+        0.0, f"Strength of lamp {lamp}: at 1 surfaces that face it have their own colour; at 0 it is off",
         low=0, high=10, label=f"Lamp {lamp} strength", varies=True, since="1.3.0",
     )  # fmt: skip
 
@@ -70,8 +70,8 @@ class Shading:
     lamp3_strength: float = _strength(3)
     lamp3_warmth: float = _warmth(3)
     occlusion: float = setting(
-        0.0, "How much darker sockets, nostrils and whatever else is closed in are, in the fast preset; 1 is "
-        "what the head's shape says, and quality traces it in any case",
+        0.0, "Shade in sockets, nostrils and other hollows, in the fast preset; 1 is the shade that the "
+        "head's shape gives, and quality always traces it",
         low=0, high=1, label="Occlusion", varies=True, since="1.3.0",
     )  # fmt: skip
     gloss: float = setting(
@@ -80,19 +80,18 @@ class Shading:
     )  # fmt: skip
 
     skin_detail: float = setting(
-        0.0, "Relief of the skin, from furrows of 2.5 mm to pores, as far as pixels are fine: 1 is skin",
+        0.0, "Relief of the skin, from furrows of 2.5 mm to pores, where pixels are small enough; 1 is skin",
         low=0, high=4, label="Skin detail", varies=True, since="1.3.0",
     )  # fmt: skip
 
     @property
     def lamps(self) -> tuple[Lamp, ...]:
         """Those that are lit."""
-        return tuple(lamp for lamp in self._lamps() if lamp.strength > 0)
+        return tuple(self._lamp(number) for number in LAMPS if getattr(self, f"lamp{number}_strength") > 0)
 
-    def _lamps(self) -> Iterator[Lamp]:
-        for lamp in LAMPS:
-            names = ("yaw_deg", "pitch_deg", "strength", "warmth")
-            yield Lamp(*(getattr(self, f"lamp{lamp}_{name}") for name in names))
+    def _lamp(self, number: int) -> Lamp:
+        names = ("yaw_deg", "pitch_deg", "strength", "warmth")
+        return Lamp(*(getattr(self, f"lamp{number}_{name}") for name in names))
 
 
 def unshaded(look: T) -> T:

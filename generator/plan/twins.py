@@ -11,6 +11,7 @@ import numpy as np
 
 from generator.errors import UsageError
 from generator.geometry.camera import framed_margin
+from generator.geometry.scene_camera import SceneCamera
 from generator.plan.distribution import TRIES, Distribution, is_choice, parse_choice, parse_distribution
 from generator.plan.draws import draw_seed, person_of
 from generator.plan.factors import FACTORS, Factor
@@ -66,13 +67,18 @@ def planned_twins(config: PlannedTwins, head: str, poses: Sequence[Pose]) -> Ite
 
 
 def plan_twins(
-    config: PlannedTwins, head: str, radius_mm: float, poses: Sequence[Pose], factor: str
+    config: PlannedTwins,
+    head: str,
+    radius_mm: float,
+    poses: Sequence[Pose],
+    factor: str,
+    scene_camera: SceneCamera | None = None,
 ) -> Views:
     """The views of the twins of a head's rows; see :func:`generator.plan.view_plan.plan_views`."""
     views = []
     for pose in poses:
         render = twin_render(config, head, radius_mm, pose, FACTORS[factor])
-        views.append(plan_view(config, render, head, radius_mm, pose))
+        views.append(plan_view(config, render, head, radius_mm, pose, scene_camera))
     return Views.of(views)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from generator import registries
 from generator.errors import UsageError
 from generator.geometry.camera import Camera, framing_distance, framing_lens
+from generator.geometry.scene_camera import SceneCamera
 from generator.plan.distribution import Distribution
 from generator.plan.draws import draw_seed, person_of
 from generator.plan.poses import pose_name
@@ -42,13 +43,18 @@ class Planned(Protocol):
         ...
 
 
-def framed_camera(lens: Lens, radius_mm: float) -> Camera:
+def framed_camera(lens: Lens, radius_mm: float, scene_camera: SceneCamera | None = None) -> Camera:
     """The camera of a lens before a head.
 
     radius_mm: of the sphere about the pivot that holds the head. Its distance is the one that was
     asked for, or where the head just fits into the shorter side, rounded to 0.01 mm; with zoom, the focal
-    length is what makes it fit. Raises UsageError where it would stand inside of the head.
+    length is what makes it fit. scene_camera: of the head's Blender scene, which takes the place of all that
+    where the lens says so. Raises UsageError where it would stand inside of the head, or there is no such.
     """
+    if lens.scene_camera:
+        if scene_camera is None:
+            raise UsageError("no camera of a Blender scene can be used here; remove --scene-camera")
+        return scene_camera.at(lens.resolution)
     width, height = image_size(lens)
     # A lens is said for the width of the image, and the head has to fit into its shorter side.
     margin = lens.margin * width / min(width, height)
@@ -69,29 +75,43 @@ def framed_camera(lens: Lens, radius_mm: float) -> Camera:
 def image_size(lens: Lens) -> tuple[int, int]:
     """Width and height of the images, pixels."""
     if lens.aspect >= 1:
-        return lens.resolution, max(1, round(lens.resolution / lens.aspect))
-    return max(1, round(lens.resolution * lens.aspect)), lens.resolution
+        return lens.resolution, round(lens.resolution / lens.aspect)
+    return round(lens.resolution * lens.aspect), lens.resolution
 
 
-def plan_views(config: Planned, head: str, radius_mm: float, poses: Sequence[Pose]) -> Views:
+def plan_views(
+    config: Planned,
+    head: str,
+    radius_mm: float,
+    poses: Sequence[Pose],
+    scene_camera: SceneCamera | None = None,
+) -> Views:
     """The views of a head at some poses, the same for whoever asks: a build, verify, replay, a preview.
 
-    head: subject/expression, on which draws depend. radius_mm: as in :func:`framed_camera`.
+    head: subject/expression, on which draws depend. radius_mm, scene_camera: as in :func:`framed_camera`.
     """
     render = config.render
     if not (config.drawn or _is_random(render) or len(registries.DRAWS)):
-        return Views(tuple(poses), (framed_camera(render, radius_mm),), (render.look,))
+        return Views(tuple(poses), (framed_camera(render, radius_mm, scene_camera),), (render.look,))
     views = []
     for pose in poses:
-        views.append(plan_view(config, drawn_render(config, head, pose), head, radius_mm, pose))
+        drawn = drawn_render(config, head, pose)
+        views.append(plan_view(config, drawn, head, radius_mm, pose, scene_camera))
     return Views.of(views)
 
 
-def plan_view(config: Planned, render: Render, head: str, radius_mm: float, pose: Pose) -> View:
+def plan_view(
+    config: Planned,
+    render: Render,
+    head: str,
+    radius_mm: float,
+    pose: Pose,
+    scene_camera: SceneCamera | None = None,
+) -> View:
     """The view of a head at a pose with the settings of its image, as :func:`drawn_render` draws them."""
     # Where nothing is random, views need no seed, and units have the name of any other.
     seed = view_seed(config.poses.seed, head, pose) if _is_random(render) else 0
-    view = View(pose, framed_camera(render, radius_mm), render.look, seed)
+    view = View(pose, framed_camera(render, radius_mm, scene_camera), render.look, seed)
     return _drawn(view, config.poses.seed, head)
 
 

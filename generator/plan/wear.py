@@ -43,27 +43,27 @@ class Wear:
     beard: str = _kind("beard", "Beard", "Beard")
     glasses: str = _kind("glasses", "Glasses", "Glasses")
     lenses: str = setting(
-        LENSES[0], f"Of glasses: {', '.join(LENSES)}", label="Lenses", varies=True, since="1.3.0"
+        LENSES[0], f"Lenses of the glasses: {', '.join(LENSES)}", label="Lenses", varies=True, since="1.3.0"
     )
-    headwear: str = _kind("headwear", "What is on the head", "Headwear")
+    headwear: str = _kind("headwear", "Headwear", "Headwear")
     headphones: str = _kind("headphones", "Headphones", "Headphones")
     mask: str = _kind("mask", "A mask over mouth and nose", "Mask")
-    clothes: str = _kind("clothes", "Shoulders, and what they wear", "Clothes")
-    occluder: str = _kind("occluder", "What is before the face", "Occluder")
+    clothes: str = _kind("clothes", "Shoulders and their clothes", "Clothes")
+    occluder: str = _kind("occluder", "A thing before the face", "Occluder")
     thing: str = setting(
         NOTHING, "One of your own things, by its name in --things; all draws from every one", label="Thing",
         varies=True, since="1.3.0",
     )  # fmt: skip
     occluder_x: float = setting(
-        0.0, "How far right of the nose it is, in widths of the face", low=-2, high=2, label="Occluder right",
-        varies=True, since="1.3.0",
+        0.0, "How far right of the nose the occluder is, in widths of the face",
+        low=-2, high=2, label="Occluder right", varies=True, since="1.3.0",
     )  # fmt: skip
     occluder_y: float = setting(
-        0.0, "How far below the nose it is, in widths of the face", low=-2, high=2, label="Occluder down",
-        varies=True, since="1.3.0",
+        0.0, "How far below the nose the occluder is, in widths of the face",
+        low=-2, high=2, label="Occluder down", varies=True, since="1.3.0",
     )  # fmt: skip
     wear_variant: float = setting(
-        0.0, "Colours, patterns and sizes of what is worn: each number between 0 and 1 has its own",
+        0.0, "Colours, patterns and sizes of worn things: a number between 0 and 1",
         low=0, high=1, label="Variant", varies=True, since="1.3.0",
     )  # fmt: skip
 

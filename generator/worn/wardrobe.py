@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +31,10 @@ NEARER_MM = 1.0
 
 DIGITS = 4
 """Of a millimetre, in what is made: rounding of other processors changes none."""
+
+KEPT = 64
+"""Things of a head that are kept for views to come: a person has about 40, and where each image has its own
+there is no end of them."""
 
 LEFT, RIGHT, NOSE = 454, 234, 1
 """Landmarks: the face's sides, whose distance is its width, and the tip of the nose."""
@@ -127,6 +132,8 @@ class Wardrobe:
             self._name, self._made = name, {}
             self._fit = Fit(mesh, on_mesh, things=things, scratch=str(self._folder))
         dressed = [self._outfit(view) for view in views]
+        if len(self._made) > KEPT:
+            self._keep({thing for things, _ in dressed for thing, _ in things})
         return Outfits([things for things, _ in dressed], [reason for _, reason in dressed])
 
     def _outfit(self, view: View) -> tuple[list[tuple[Thing, np.ndarray]], str]:
@@ -160,6 +167,16 @@ class Wardrobe:
         if isinstance(made, CannotWear):
             raise made
         return made
+
+    def _keep(self, worn: Set[Thing]) -> None:
+        """These, and nothing else that was made."""
+        for key, made in [*self._made.items()]:
+            if isinstance(made, Thing) and made not in worn:
+                made.path.unlink()
+                del self._made[key]
+        assert self._fit is not None, "a head that is dressed is known"
+        self._fit.known.clear()
+        gc.collect()  # parts of it know each other
 
     def _packed(self, kind: str, mesh: HeadMesh) -> Thing:
         mesh = replace(mesh, vertices=np.round(mesh.vertices, DIGITS))

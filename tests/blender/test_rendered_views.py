@@ -12,10 +12,12 @@ from test_render import CAMERA, FLAT, MARKS, centroid, marked_ball
 
 from generator.dataset.format.passes import passes_from_blender
 from generator.execution.lanes.renderer import Renderer
+from generator.execution.lanes.shots import Shots
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import CAMERA_FROM_GRAPHICS, rotation_from_angles
 from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
+from generator.picture.scenery import Folders
 from generator.placing.rendering import read_image
 from generator.plan.settings import Look
 from generator.plan.views import View, Views
@@ -64,8 +66,7 @@ def test_every_mark_is_where_its_own_row_says(renderer: Renderer, package: Path)
     """Lens, distance, principal point, projection and shape of the image, all different from view to view."""
     views = mixed(28)
     checked = 0
-    for view, path in zip(views, renderer.render(package, views), strict=True):
-        image = read_image(path)
+    for view, image in zip(views, Shots(renderer).take(package, views, Folders()), strict=True):
         assert image.shape == (view.camera.height, view.camera.width, 3)
         if replace(view.look, samples=FLAT.samples) != FLAT:
             continue  # its colours say nothing of the marks
@@ -85,12 +86,13 @@ def test_every_mark_is_where_its_own_row_says(renderer: Renderer, package: Path)
 def test_an_image_is_the_same_whatever_was_rendered_before_it(renderer: Renderer, package: Path) -> None:
     """Cropping, backdrops and what a stage keeps from view to view change no byte."""
     views = mixed()
-    together = [path.read_bytes() for path in renderer.render(package, views)]
-    backwards = [path.read_bytes() for path in renderer.render(package, Views.of([*views][::-1]))][::-1]
-    assert together == backwards
+    shots = Shots(renderer)
+    together = [image.tobytes() for image in shots.take(package, views, Folders())]
+    backwards = [image.tobytes() for image in shots.take(package, Views.of([*views][::-1]), Folders())]
+    assert together == backwards[::-1]
     for view, image in zip(views, together, strict=True):
-        [alone] = renderer.render(package, Views.of([view]))
-        assert alone.read_bytes() == image
+        [alone] = shots.take(package, Views.of([view]), Folders())
+        assert alone.tobytes() == image
     assert len(set(together)) == len(together)
 
 

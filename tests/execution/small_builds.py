@@ -97,16 +97,21 @@ class Host:
         self.output.seek(0)
         return self.output.read()
 
-    def workers(self) -> list[psutil.Process]:
-        """Every process the build started that is alive."""
+    def workers(self, module: str = "") -> list[psutil.Process]:
+        """Every process the build started that is alive, or those that run a module."""
         found = []
         for process in psutil.process_iter():
             try:
-                if process.pid != self.process.pid and process.environ().get("HEADTURN_TEST") == self._mark:
+                if (
+                    process.pid != self.process.pid
+                    and process.environ().get("HEADTURN_TEST") == self._mark
+                    and process.status() != psutil.STATUS_ZOMBIE
+                    and module in " ".join(process.cmdline())
+                ):
                     found.append(process)
             except psutil.Error:
                 continue  # it ended while we looked, or is not ours
-        return [p for p in found if p.status() != psutil.STATUS_ZOMBIE]
+        return found
 
     def orphans(self, patience: float = 3.0) -> list[str]:
         """Command lines of workers that are still there some time after the host's end."""

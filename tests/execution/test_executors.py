@@ -76,7 +76,9 @@ def opened(
     with_fake_lanes(name, monkeypatch)
     if name not in kept:
         given = Circumstances(tmp_path_factory.mktemp("scratch"), WORKERS, None, LaneOptions())
+        before = os.environ.copy()
         kept[name] = registries.EXECUTORS.get(name)(given)
+        assert os.environ == before, "what it starts has an environment of its own; the caller keeps his"
     return kept[name]
 
 

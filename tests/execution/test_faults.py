@@ -165,9 +165,9 @@ def test_a_unit_that_always_breaks_is_quarantined_and_built_once_it_can_be(
 def test_a_lane_that_hangs_is_replaced(built: Built, tmp_path: Path) -> None:
     """SIGSTOP: alive, silent, deaf to everything but SIGKILL."""
     with host(built[0], looked_at(built, tmp_path / "d"), "--workers", "1", "--deadline", "8") as started:
-        while not any("execution.lane" in " ".join(p.cmdline()) for p in started.workers()):
+        while not (lanes := started.workers("generator.execution.lanes.lane_main")):
             time.sleep(0.05)
-        [lane] = [p for p in started.workers() if "generator.execution.lanes.lane_main" in p.cmdline()]
+        [lane] = lanes
         lane.suspend()
         assert started.wait() == 0, started.text()
         assert not started.orphans()

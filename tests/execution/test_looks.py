@@ -53,7 +53,7 @@ def test_the_same_seed_is_the_same_look_everywhere(
 
     with ExitStack() as stack:
         server = PreviewServer(tmp_path, stack)
-        server.answer({"op": "list", "config": given, "cache": str(tmp_path / "cache")})
+        server.answer({"op": "list", "config": given, "made": str(tmp_path / "made")})
         package, subject = str(tmp_path / "head.npz"), row["subject"]
         named = {"subject": subject, "expression": "neutral"}
         placed = server.answer({"op": "place", "config": given, "package": package, **named})

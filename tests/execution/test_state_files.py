@@ -317,7 +317,8 @@ def test_a_part_that_was_written_anew_is_not_taken(dry: DryBuild, change: str, r
     """What a flipped bit of a footer can do, which has no checksum; found by make soak."""
     dry.build()
     digest = dry.digest
-    part = dry.root / next(p.path for p in read_manifest(dry.root).parts if p.rows == 4)
+    # the first of all, whose schema is looked at before anything else
+    part = dry.root / min(p.path for p in read_manifest(dry.root).parts)
     table = pq.read_table(part, partitioning=None)
     if change == "another value":
         if not receipts:
@@ -332,6 +333,6 @@ def test_a_part_that_was_written_anew_is_not_taken(dry: DryBuild, change: str, r
     if not receipts:
         (dry.root / RECEIPTS_FILE).unlink()
     dry.build()
-    assert len(dry.rendered) == 4
+    assert len(dry.rendered) == len(table)
     assert dry.digest == digest
     dry.check()

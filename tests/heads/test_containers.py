@@ -51,7 +51,7 @@ def test_vrm_is_a_glb(tmp_path: Path) -> None:
     assert len(read(tmp_path / "head.vrm", tmp_path / "scratch").triangles) == 80
 
 
-@pytest.mark.parametrize("name", ["anna.x3d", "anna.ABC", "anna.blend", "anna.3ds"])
+@pytest.mark.parametrize("name", ["anna.x3d", "anna.ABC", "anna.3ds"])
 def test_what_is_not_read_is_skipped_with_the_way_out(tmp_path: Path, name: str) -> None:
     plain_obj(tmp_path / "good.obj")
     (tmp_path / name).write_bytes(b"x")
@@ -63,6 +63,16 @@ def test_what_is_not_read_is_skipped_with_the_way_out(tmp_path: Path, name: str)
         assert skip.reason.startswith(f"{kind} is not read; open the file in ")
         assert skip.reason.endswith("and export it as GLB")
     assert len(find_heads(tmp_path).heads) == 1
+
+
+def test_a_scene_among_other_heads_is_a_source_of_its_own(tmp_path: Path) -> None:
+    plain_obj(tmp_path / "good.obj")
+    (tmp_path / "anna.blend").write_bytes(b"BLENDER")
+    source = find_heads(tmp_path)
+    assert len(source.heads) == 1
+    assert [skip.reason for skip in source.skipped] == [
+        "anna.blend is a scene, and a source of its own: headturn build anna.blend"
+    ]
 
 
 def test_a_head_that_comes_in_a_format_that_is_read_too_is_not_skipped(tmp_path: Path) -> None:

@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hostile_command import Command
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "dataset"))
-
-Command = Callable[..., tuple[int, str]]
-"""Takes the words of a command; its exit code, and what it said on stderr."""
 
 
 @pytest.fixture

@@ -53,7 +53,7 @@ DOORS: dict[str, Door] = {
 }
 """Every command that opens a dataset."""
 
-NO_DATASET = {"build", "preview", "environment", "preview-server", "heads make", "heads list"}
+NO_DATASET = {"build", "preview", "doctor", "environment", "preview-server", "heads make", "heads list"}
 """Those that open none. build opens its own folder: tests/execution/test_state_files.py."""
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import Command
+from hostile_command import Command
 from hostile_files import DEEP, JP2, NO_FILES, png
 from memory import peak_mb
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Command
+from hostile_command import Command
 from hostile_files import DEEP, NO_FILES
 from PIL import Image
 

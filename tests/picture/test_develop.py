@@ -9,7 +9,17 @@ import cv2
 import numpy as np
 import pytest
 
-from generator.picture.develop import GREY, developed, disc, noise_sd, streak, to_srgb, toned
+from generator.picture.develop import (
+    GREY,
+    developed,
+    disc,
+    noise_sd,
+    normal,
+    softened,
+    streak,
+    to_srgb,
+    toned,
+)
 from generator.plan.settings import Look
 
 RAMP = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 64, axis=0).repeat(3, axis=2)
@@ -110,6 +120,13 @@ def test_detail_takes_what_is_fine_and_leaves_what_is_coarse() -> None:
     assert linear(seen(halves, detail=0.25)).std() > 0.4
 
 
+def test_softened_coverage_has_edges_of_two_pixels() -> None:
+    edge = np.zeros((4, 6), np.float16)
+    edge[:, 3:] = 1
+    assert softened(edge).tolist() == [[0, 0, 0.25, 0.75, 1, 1]] * 4
+    assert softened(edge.T).tolist() == softened(edge).T.tolist()
+
+
 def test_jpeg_is_what_the_encoder_makes_of_it() -> None:
     rng = np.random.default_rng(0)
     picture = cv2.resize(rng.integers(0, 256, (8, 8, 3), dtype=np.uint8), (64, 64))
@@ -118,11 +135,19 @@ def test_jpeg_is_what_the_encoder_makes_of_it() -> None:
     np.testing.assert_array_equal(seen(picture, jpeg=5), seen(picture, jpeg=5))
 
 
+def test_grain_is_normal_and_its_own_for_every_seed() -> None:
+    some, other = normal((256, 256, 3), 5), normal((256, 256, 3), 6)
+    assert np.array_equal(some, normal((256, 256, 3), 5 + (1 << 31) * 3)), "of a seed of any size"
+    assert abs(np.corrcoef(some.ravel(), other.ravel())[0, 1]) < 0.01
+    for reach, share in ((1.0, 0.6827), (2.0, 0.9545), (3.0, 0.9973)):
+        assert (np.abs(some) < reach).mean() == pytest.approx(share, abs=0.003)
+
+
 def test_light_comes_before_noise_and_noise_before_the_tone_curve() -> None:
     flat = np.full((200, 200, 3), 118, np.uint8)
     dark = linear(seen(flat, exposure_ev=-2.0, noise=0.02)).std()
     assert dark < linear(seen(flat, noise=0.02)).std(), "less light, less shot noise"
-    grain = np.random.default_rng(1).standard_normal(flat.shape, dtype=np.float32)
+    grain = normal(flat.shape, 1)
     light = linear(flat).astype(np.float32)
     expected = toned(to_srgb(light + noise_sd(light, 0.02) * grain), 0.5)
     np.testing.assert_allclose(seen(flat, noise=0.02, contrast=0.5) / 255, expected, atol=0.0021)

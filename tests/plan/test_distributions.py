@@ -13,13 +13,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from generator import registries
 from generator.cli.options import values_of
 from generator.errors import UsageError
 from generator.geometry.camera import framing_distance, framing_lens
 from generator.plan.config import BuildConfig, config_toml, load_config, read_recorded
-from generator.plan.distribution import Distribution, is_distribution, parse_distribution
+from generator.plan.distribution import (
+    Distribution,
+    is_choice,
+    is_distribution,
+    parse_choice,
+    parse_distribution,
+)
 from generator.plan.settings import all_settings
-from generator.plan.view_plan import drawn_render, plan_views
+from generator.plan.view_plan import drawn_render, drawn_values, plan_views
+from generator.plan.views import View
+from generator.registry import Registry
 
 POSES = [(0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (0.0, -20.0, 5.0)]
 FLAGS: dict[str, list[Any]] = {}
@@ -44,6 +53,7 @@ def drawn(config: BuildConfig, head: str = "amy/neutral", pose: Any = POSES[0]) 
         ("log-uniform:1,100", 99 / math.log(100), 1, 100),
         ("normal:5,1", 5.0, 0, 10),
         ("choice:1,2,9", 4.0, 1, 9),
+        ("choice:0,1000", 500.0, 0, 1000),
     ],
 )
 def test_draws_have_the_distribution_that_was_asked_for(
@@ -57,7 +67,7 @@ def test_draws_have_the_distribution_that_was_asked_for(
     if text.startswith("log"):
         assert abs(np.log(values).mean() - math.log(10)) < 0.1
     if text.startswith("choice"):
-        assert set(values) == {1, 2, 9}
+        assert set(values) == set(found.numbers)
     assert found.text == text and parse_distribution(f"head:{text}").per_head
 
 
@@ -66,6 +76,52 @@ def test_a_normal_distribution_stays_within_what_the_setting_may_be() -> None:
     rng = np.random.default_rng(1)
     values = [found.draw(rng) for _ in range(500)]
     assert min(values) >= 0 and max(values) <= 1 and len(set(values)) > 400
+
+
+def test_what_is_drawn_has_six_significant_digits() -> None:
+    found, rng = parse_distribution("uniform:0,1"), np.random.default_rng(0)
+    values = [found.draw(rng) for _ in range(50)]
+    assert all(float(f"{value:.6g}") == value for value in values)
+    assert any(float(f"{value:.5g}") != value for value in values)
+
+
+def test_what_can_hardly_be_drawn_is_the_middle() -> None:
+    assert Distribution("normal", (5.0, 0.1), low=50).draw(np.random.default_rng(0)) == 5.0
+
+
+@pytest.mark.parametrize(
+    ("text", "middle"),
+    [
+        ("uniform:5,5", 5),
+        ("uniform:0,0", 0),
+        ("log-uniform:4,4", 4),
+        ("log-uniform:4,9", 6),
+        ("normal:5,0", 5),
+        ("normal:5,2000", 5),  # a deviation is no value
+        ("choice:0", 0),
+        ("uniform:0,1000", 500),
+    ],
+)
+def test_what_just_is_a_distribution(text: str, middle: float) -> None:
+    found = parse_distribution(text, 0, 1000)
+    assert found.middle == middle and 0 <= found.draw(np.random.default_rng(0)) <= 1000
+
+
+@pytest.mark.parametrize(
+    ("limits", "span"), [({"low": 2}, "from 2 to any"), ({"high": 0.5}, "from any to 0.5")]
+)
+def test_a_limit_on_one_side(limits: dict[str, float], span: str) -> None:
+    with pytest.raises(ValueError, match=f"1 is outside what the setting may be, {span}"):
+        parse_distribution("choice:1,2" if "low" in limits else "choice:0.5,1", **limits)
+
+
+def test_a_choice_of_texts() -> None:
+    found = parse_choice("head:choice:cap,hat,none")
+    assert (found.text, found.middle, found.per_head) == ("head:choice:cap,hat,none", "cap", True)
+    drawn = [found.draw(np.random.default_rng(k)) for k in range(60)]
+    assert all(drawn.count(text) > 10 for text in ("cap", "hat", "none"))
+    with pytest.raises(ValueError, match="expected texts separated by commas"):
+        parse_choice("choice:cap,,none")
 
 
 @given(st.sampled_from(["uniform", "log-uniform"]), st.floats(0.01, 50), st.floats(0, 50))
@@ -121,6 +177,41 @@ def test_a_draw_depends_on_seed_head_pose_and_its_own_name_alone() -> None:
     alone = [plan_views(both, "amy/neutral", 120.0, [pose])[0] for pose in POSES]
     assert [*together] == alone, "whichever other images there are"
     assert len({view.camera.lens_mm for view in together}) == 3
+
+
+def test_what_was_drawn_is_told_as_json_has_it() -> None:
+    ours = config(lens_mm="uniform:28,135", background=["uniform:0,1", 0.25, "uniform:0,1"])
+    [view] = plan_views(ours, "amy/neutral", 120.0, POSES[:1])
+    assert drawn_values(ours, "amy/neutral", POSES[0]) == {
+        "lens_mm": view.camera.lens_mm,
+        "background": list(view.look.background),
+    }
+    assert view.seed == 0, "nothing in it is random"
+
+
+def test_what_others_draw_depends_on_seed_head_pose_and_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    def shaken(view: View, rng: np.random.Generator) -> View:
+        return replace(view, look=replace(view.look, ambient=rng.random()))
+
+    def ambients(head: str, seed: int = 0) -> list[float]:
+        ours = load_config(None, {"poses": {"seed": seed}})
+        return [view.look.ambient for view in plan_views(ours, head, 120.0, POSES)]
+
+    plain = ambients("amy/neutral")
+    draws: Registry[Any] = Registry("draw", {})
+    monkeypatch.setattr(registries, "DRAWS", draws)
+    found = {}
+    for name in ("dusk", "dawn"):
+        draws.add(name, shaken)
+        found |= {
+            (name, head, seed): ambients(head, seed) for head in ("amy/neutral", "bob") for seed in (0, 1)
+        }
+        assert ambients("bob") == found[name, "bob", 0]
+        draws.remove(name)
+    assert len({value for values in found.values() for value in values}) == 8 * len(POSES)
+    assert plain == [plain[0]] * len(POSES) and plain[0] not in {
+        v for values in found.values() for v in values
+    }
 
 
 def test_a_draw_a_head_is_the_same_for_all_its_images() -> None:
@@ -227,4 +318,6 @@ def test_options_that_are_neither_are_said(flag: str, text: str, said: str) -> N
 
 
 def test_which_texts_are_distributions() -> None:
+    assert is_choice("choice:cap") and is_choice("head:choice:cap") and not is_choice("uniform:1,2")
+    assert not is_choice(1.0)
     assert is_distribution("uniform:1,2") and not is_distribution("50") and not is_distribution(50.0)

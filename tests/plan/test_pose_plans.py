@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from generator.errors import DatasetError
-from generator.plan.config import load_config
+from generator.errors import DatasetError, UsageError
+from generator.plan import pose_plans
+from generator.plan.config import BuildConfig, load_config
 from generator.plan.pose_plans import (
     PosePlans,
     is_drawn,
@@ -22,6 +23,7 @@ from generator.plan.pose_plans import (
     shared_plan,
 )
 from generator.plan.poses import PosePlan, plan_of
+from generator.plan.settings import Poses
 
 POSE = st.tuples(
     st.floats(-90, 90, exclude_min=True, exclude_max=True), *[st.floats(-180, 180, exclude_min=True)] * 2
@@ -167,3 +169,26 @@ def test_one_plan_for_all(poses: dict) -> None:
     plans = plan_poses(config, HEAD_NAMES)
     assert not plans.by_head and same(plans.shared, shared_plan(config))
     assert plans.of("amy", "neutral") is plans.of("bob", "neutral")
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [{"kind": "sobol", "count": 3}, {"yaw": [-50, 50, 50], "pitch": [0, 0, 1], "roll": [0, 0, 1]}],
+)
+def test_as_many_rows_as_are_allowed_and_not_one_more(poses: dict, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = load_config(None, {"poses": poses})
+    monkeypatch.setattr(pose_plans, "MAX_ROWS", 9)
+    assert plan_poses(config, HEAD_NAMES).count(HEAD_NAMES) == 9
+    with pytest.raises(UsageError, match="12 rows, more than 9; use fewer heads or poses"):
+        plan_poses(config, [*HEAD_NAMES, ("zoe", "neutral")])
+
+
+def test_a_draw_takes_no_step() -> None:
+    config = load_config(None, {"poses": {"kind": "sobol", "yaw": [0, 10, 5]}})
+    with pytest.raises(UsageError, match=r"poses\.yaw: a sobol plan takes low and high"):
+        plan_poses(config, HEAD_NAMES)
+
+
+def test_a_table_of_poses_needs_its_path() -> None:
+    with pytest.raises(UsageError, match=r"poses\.path: a CSV pose plan needs the path of its file"):
+        shared_plan(BuildConfig(poses=Poses(kind="csv")))

@@ -18,7 +18,7 @@ from generator.plan.settings import Look
 from generator.plan.views import View, Views
 from generator.registries import WORN
 from generator.worn.fit import Fit, Kind
-from generator.worn.wardrobe import Outfits, Wardrobe
+from generator.worn.wardrobe import KEPT, Outfits, Wardrobe
 
 FIT = soft_fits()["bust"]
 MADE: list[tuple[str, dict[str, str]]] = []
@@ -65,6 +65,19 @@ def test_a_variant_decides_and_is_the_same_again(tmp_path: Path) -> None:
     assert np.array_equal(one, three) and not np.allclose(one, two)
     [again] = places(dressed(Wardrobe(tmp_path / "b"), looks[0]))
     assert np.array_equal(one, again), "whatever was made before"
+
+
+def test_of_many_things_those_of_the_last_views_are_kept(tmp_path: Path) -> None:
+    """Where every image has its own, a head of many images has no end of them."""
+    wardrobe = Wardrobe(tmp_path / "worn")
+    looks = [Look(glasses="round", wear_variant=number / 100) for number in range(KEPT + 2)]
+    first = dressed(wardrobe, *looks[:-2])
+    assert all(Path(one[0].package).exists() for one in first.worn)
+    before = places(first)
+    dressed(wardrobe, *looks[-2:])
+    assert len([*(tmp_path / "worn").glob("*.npz")]) == 2
+    [again] = places(dressed(wardrobe, looks[0]))
+    assert np.array_equal(again, before[0]), "the same when it is made again"
 
 
 def test_what_has_no_finite_shape_or_no_place_is_left_out(

@@ -16,7 +16,7 @@ from generator.dataset.format.files import one_line, write_atomically
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import heads_version, read_heads
 from generator.dataset.format.parquet import read_table
-from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
+from generator.dataset.format.schema import check_schema_version, is_newer, schema_version_of
 from generator.errors import DatasetError
 from generator.landmarks.topology import FACE_MESH
 
@@ -98,7 +98,7 @@ def read_anchors(root: Path) -> dict[tuple[str, str], HeadAnchors]:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"
         ) from error
-    version = stored_version(table.schema)
+    version = schema_version_of(table.schema)
     check_schema_version(version, str(path))
     count = _points(table.schema)
     expected = anchors_schema(count)

@@ -24,7 +24,7 @@ from generator.registries import DETECTORS
 if TYPE_CHECKING:
     from generator.dataset.format.unit_rows import UnitRows
 
-SCHEMA_VERSION = "1.4.0"
+SCHEMA_VERSION = "1.5.0"
 """A new column raises the middle number, and says so in its ``since``; readers of the old one go on."""
 
 ImageMode = Literal["none", "files", "embedded"]

@@ -9,7 +9,7 @@ from typing import TypeVar
 import pyarrow as pa
 
 from generator.dataset.format.columns import ROWS, SCHEMA_VERSION, version_number
-from generator.dataset.format.schema import is_newer, part_schema, stored_version, topology_of
+from generator.dataset.format.schema import is_newer, part_schema, schema_version_of, topology_of
 
 Rows = TypeVar("Rows", pa.RecordBatch, pa.Table)
 
@@ -22,7 +22,7 @@ def todays_schema(stored: pa.Schema, where: str = "the schema") -> pa.Schema:
     where: the file, for the message.
     Raises DatasetError: it is older, and no registered topology is that of its landmarks.
     """
-    version = stored_version(stored)
+    version = schema_version_of(stored)
     later = [c for c in ROWS.values() if is_newer(c.since, version) and c.name not in stored.names]
     if version_number(version) is None or not is_newer(SCHEMA_VERSION, version):
         return stored

@@ -16,10 +16,12 @@ from generator.dataset.format.columns import SCHEMA_VERSION, Column, columns_at,
 from generator.dataset.format.files import one_line, write_atomically
 from generator.dataset.format.guard import check_head_texts, dataset_file
 from generator.dataset.format.parquet import read_table
-from generator.dataset.format.schema import check_schema_version, is_newer, stored_version
+from generator.dataset.format.schema import check_schema_version, is_newer, schema_version_of
 from generator.errors import DatasetError
 from generator.escape import quoted
 from generator.geometry.camera import Camera, Projection
+from generator.geometry.scene_camera import SceneCamera
+from generator.heads.head import SCENE
 from generator.landmarks.anchors import WAYS
 from generator.landmarks.topology import FACE_MESH
 from generator.names import source_path_problem
@@ -163,6 +165,17 @@ class HeadRow:
             since="1.2.0",
         ),
     )
+    scene_camera: tuple[float, ...] = field(
+        default=(),
+        metadata=column(
+            list_of(_NUMBER),
+            "of a head in a Blender scene, the scene's own camera: lens, sensor width and height (mm), which "
+            "side it fits (0 the longer, 1 width, 2 height), shifts, height of a pixel over its width, width "
+            "and height of the scene's images, and the head's pivot in frame C (mm); else empty",
+            check="camera",
+            since="1.5.0",
+        ),
+    )
     vertices: int = field(metadata=column(_COUNT, "of the mesh"))
     triangles: int = field(metadata=column(_COUNT, "of the mesh"))
     problems: tuple[str, ...] = field(
@@ -170,6 +183,11 @@ class HeadRow:
         metadata=column(list_of(_TEXT), "what was wrong but did not stop the head from being built"),
     )
     split: str = field(metadata=column(_TEXT, "train or validation", check="identity"))
+
+    @property
+    def own_camera(self) -> SceneCamera | None:
+        """The scene's own camera. Raises ValueError: its numbers are none."""
+        return SceneCamera.of_numbers(self.scene_camera) if self.scene_camera else None
 
     def camera(self, resolution: int) -> Camera:
         """The camera that saw this head."""
@@ -200,7 +218,7 @@ def copy_heads(source: Path, chosen: Collection[tuple[str, str]], target: Path) 
     and with those of a later schema that we do not know. Raises DatasetError as :func:`read_heads` does."""
     heads = [head for head in read_heads(source) if (head.subject, head.expression) in chosen]
     stored = _read(dataset_file(source, HEADS_FILE))
-    if not is_newer(stored_version(stored.schema)):
+    if not is_newer(schema_version_of(stored.schema)):
         write_heads(heads, target)
         return
     names = zip(*(stored.column(name).to_pylist() for name in ("subject", "expression")), strict=True)
@@ -214,7 +232,7 @@ def read_heads(root: Path) -> list[HeadRow]:
     """
     path = dataset_file(root, HEADS_FILE)
     table = _read(path)
-    version = stored_version(table.schema)
+    version = schema_version_of(table.schema)
     expected = heads_schema(version)
     known = table.select([name for name in table.schema.names if name in HEADS])
     if not (known if is_newer(version) else table).schema.equals(expected):
@@ -230,7 +248,7 @@ def read_heads(root: Path) -> list[HeadRow]:
 
 def heads_version(root: Path) -> str:
     """The schema version of heads.parquet. Raises DatasetError as :func:`read_heads` does."""
-    return stored_version(_read(dataset_file(root, HEADS_FILE)).schema)
+    return schema_version_of(_read(dataset_file(root, HEADS_FILE)).schema)
 
 
 def _read(path: Path) -> pa.Table:
@@ -241,7 +259,7 @@ def _read(path: Path) -> pa.Table:
         raise DatasetError(
             f"{path}: cannot be read ({one_line(error)}); run `headturn build` again"
         ) from error
-    check_schema_version(stored_version(table.schema), str(path))
+    check_schema_version(schema_version_of(table.schema), str(path))
     return table
 
 
@@ -254,8 +272,9 @@ def _write(table: pa.Table, root: Path) -> None:
 
 
 def _check_files(head: HeadRow, where: Path) -> None:
-    for path in (head.mesh_path, *(path for path, _ in head.file_sha256)):
-        if problem := source_path_problem(path):
+    named = [(head.mesh_path, False), *((path, head.source == SCENE) for path, _ in head.file_sha256)]
+    for path, above in named:
+        if problem := source_path_problem(path, above=above):
             raise DatasetError(f"{where}: the file {quoted(path)} of {head.subject} {problem}")
 
 

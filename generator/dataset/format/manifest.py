@@ -185,9 +185,13 @@ def read_manifest(root: Path) -> Manifest:
     contradicts itself, or its seal is not its own.
     """
     if not root.is_dir():
-        raise DatasetError(f"{root}: no such folder; give the folder that `headturn build --out` wrote")
+        what = "a file" if root.exists() else "no such folder"
+        raise DatasetError(f"{root}: {what}; give the folder that `headturn build --out` wrote")
     path = dataset_file(root, MANIFEST_FILE)
     if not path.exists():
+        around = next((one for one in root.resolve().parents if (one / MANIFEST_FILE).is_file()), None)
+        if around is not None:
+            raise DatasetError(f"{root}: a part of a dataset; give all of it, {around}")
         raise DatasetError(
             f"{root}: not a Headturn dataset, or its build did not finish (no {MANIFEST_FILE}); "
             "run `headturn build` again"

@@ -103,7 +103,8 @@ def as_array(table: pa.Table | pa.RecordBatch, name: str) -> np.ndarray:
     if not pa.types.is_fixed_size_list(column.type):
         return column.to_numpy(zero_copy_only=False)
     values = EVERY[name].values_a_point if name in EVERY else 0
-    shape = (-1, values) if values > 1 else (column.type.list_size,)
+    size = column.type.list_size
+    shape = (size // values, values) if values > 1 else (size,)  # numpy finds no side of no rows
     return column.flatten().to_numpy(zero_copy_only=False).reshape(len(column), *shape)
 
 

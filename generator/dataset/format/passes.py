@@ -16,9 +16,11 @@ import numpy as np
 from generator.dataset.format.files import one_line
 from generator.errors import DatasetError, UsageError, WorkerError
 from generator.exr_header import check_exr
+from generator.heads.scene import Eye
 from generator.labels import LABELS
 from generator.plan.passes import (
     ALBEDO,
+    DEPTH,
     LABELS_A_PICTURE,
     OBJECT_INDEX,
     PAINTED,
@@ -28,6 +30,7 @@ from generator.plan.passes import (
 )
 from generator.process import native_silence
 from generator.registries import PASSES
+from litert_faces.installing import install_command
 
 COVERAGE = 1e-3
 """How near the classes of a pixel add up to what they cover."""
@@ -38,11 +41,15 @@ _HEADER = {
 }
 
 
-def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -> dict[str, np.ndarray]:
+def passes_from_blender(
+    path: Path, passes: Sequence[str], distance_mm: float, eye: Eye | None = None
+) -> dict[str, np.ndarray]:
     """What Blender wrote, in frame C and metres: {"depth.Z": float32 [H, W], ...}.
 
     passes: those of the registry :data:`generator.registries.PASSES` that are wanted.
-    distance_mm: camera to pivot. Pixels without a surface hold what the pass says, mostly NaN.
+    distance_mm: camera to pivot. eye: the camera in the world of a scene; without it the head stands alone
+    in front of it, in frame B, its pivot at the origin. Pixels without a surface hold what the pass says,
+    mostly NaN.
     Raises WorkerError if a pass is not in the file, UsageError if there is no such pass.
     """
     layers = _layers(read_channels(path))
@@ -54,15 +61,30 @@ def passes_from_blender(path: Path, passes: Sequence[str], distance_mm: float) -
             made |= PAINTERS[name](path)
             continue
         values = _layer(wanted, layers, path)
-        if wanted.turned:
+        if eye is not None:
+            values = _of_scene(values, wanted, eye)
+        elif wanted.turned:
             x, y, z = np.moveaxis(values, -1, 0)
             values = np.stack([x, -z, y], axis=-1)  # frame B to frame C
-        if wanted.from_pivot:
+        if wanted.from_pivot and eye is None:
             values[..., 2] += np.float32(distance_mm * 1e-3)
         values = np.where(nothing[..., None], np.float32(wanted.empty), values)
         for place, channel in enumerate(wanted.channel_names):
             made[channel] = np.ascontiguousarray(values[..., place])
     return made
+
+
+def _of_scene(values: np.ndarray, wanted: Pass, eye: Eye) -> np.ndarray:
+    """What Blender wrote of a scene, in frame C and metres."""
+    if wanted.from_pivot:
+        found = eye.points(values.astype(np.float64)) * 1e-3
+    elif wanted.turned:
+        found = eye.directions(values.astype(np.float64))
+    elif wanted.switch == DEPTH.switch:
+        found = values * (eye.mm * 1e-3)
+    else:
+        return values
+    return found.astype(np.float32)
 
 
 def _albedo(path: Path) -> dict[str, np.ndarray]:
@@ -177,7 +199,5 @@ def _openexr() -> Any:
     try:
         import OpenEXR
     except ImportError as error:
-        raise UsageError(
-            f"passes need the OpenEXR package ({error}): pip install 'headturn[build]'"
-        ) from error
+        raise UsageError(f"passes need the OpenEXR package ({error}): {install_command('build')}") from error
     return OpenEXR

@@ -100,14 +100,14 @@ def topology_of(schema: pa.Schema, where: str = "the schema") -> Topology:
         raise DatasetError(f"{where}: {error}; read it with the Headturn that wrote it") from error
 
 
-def stored_version(schema: pa.Schema) -> str:
-    """The schema version a file says it has; "none" if it says nothing."""
-    return (schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
+NO_VERSION = "none"
 
 
 def schema_version_of(schema: pa.Schema) -> str:
-    """The schema version in a part's metadata; "none" where there is none."""
-    return (schema.metadata or {}).get(b"headturn.schema_version", b"none").decode(errors="replace")
+    """The schema version in a part's metadata; NO_VERSION where there is none."""
+    return (
+        (schema.metadata or {}).get(b"headturn.schema_version", NO_VERSION.encode()).decode(errors="replace")
+    )
 
 
 def versions_of(schema: pa.Schema) -> dict[str, str]:

@@ -58,7 +58,8 @@ def planned_views(
     def views(head: int) -> Views:
         row = heads[head]
         angles = poses.plan(head).angles_deg.tolist()
-        return plan_views(config, f"{row.subject}/{row.expression}", row.radius_mm, [*map(tuple, angles)])
+        name = f"{row.subject}/{row.expression}"
+        return plan_views(config, name, row.radius_mm, [*map(tuple, angles)], row.own_camera)
 
     return lambda head, pose: views(head)[pose]
 

@@ -99,7 +99,8 @@ class TwinPlan:
             row = self._heads[head]
             yaw, pitch, roll = self._poses.plan(head).angles_deg[pose].tolist()
             name = f"{row.subject}/{row.expression}"
-            return plan_twins(self._config, name, row.radius_mm, [(yaw, pitch, roll)], factor)[0]
+            poses = [(yaw, pitch, roll)]
+            return plan_twins(self._config, name, row.radius_mm, poses, factor, row.own_camera)[0]
 
         return lambda factor: lambda head, pose: view(factor, head, pose)
 

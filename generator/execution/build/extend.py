@@ -15,7 +15,7 @@ import pyarrow as pa
 from generator.dataset.format.columns import SCHEMA_VERSION
 from generator.dataset.format.part import part_schema_of, read_part, write_part
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import schema_version_of
+from generator.dataset.format.schema import NO_VERSION, schema_version_of
 from generator.errors import DatasetError
 from generator.execution.build.receipts import Receipts
 from generator.messages import BuildOrder
@@ -55,6 +55,8 @@ def check_schema_of_parts(root: Path) -> None:
         except DatasetError:
             continue  # the build will find it damaged and build it again
         found = schema_version_of(schema)
+        if found == NO_VERSION:
+            continue  # damaged, too
         if found != SCHEMA_VERSION:
             raise DatasetError(
                 f"{root}: its rows are of schema {found}, a build adds rows of {SCHEMA_VERSION}; "

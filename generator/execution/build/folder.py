@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from generator.dataset.format.anchors_table import ANCHORS_FILE
-from generator.dataset.format.build_files import FIRST_PLACED_FILE, PLACED_FILE, RECEIPTS_FILE
+from generator.dataset.format.build_files import FIRST_PLACED_FILE, LOG_FILE, PLACED_FILE, RECEIPTS_FILE
 from generator.dataset.format.files import write_bytes
 from generator.dataset.format.guard import dataset_file
 from generator.dataset.format.heads_table import HEADS_FILE
@@ -21,7 +21,6 @@ from generator.errors import DatasetError
 from generator.execution.build.lock import LOCK_FILE
 from generator.execution.build.receipts import Receipts
 from generator.execution.build.unit_check import row_names
-from generator.execution.status import LOG_FILE
 from generator.heads.head import SkippedHead
 from generator.messages import BuildOrder
 from generator.names import is_text
@@ -159,12 +158,17 @@ def spare_skipped(stale: Iterable[str], skipped: Iterable[SkippedHead], receipts
             )
 
 
-def ask_to_drop(stale: Sequence[str], root: Path, confirm: Confirm) -> None:
-    """Ask before parts are removed. Raises DatasetError if the answer is no; then nothing was changed."""
+def ask_to_drop(stale: Sequence[str], root: Path, confirm: Confirm, changed: Sequence[str] = ()) -> None:
+    """Ask before parts are removed. Raises DatasetError if the answer is no; then nothing was changed.
+
+    changed: files of heads that are not as they were when the dataset was finished.
+    """
     if stale:
+        more = f", and {len(changed) - 1} more" if len(changed) > 1 else ""
+        why = f" ({changed[0]} was changed since{more})" if changed else ""
         _ask(
             confirm,
-            f"{root}: {len(stale)} parts of heads, poses or versions outside this plan will be deleted",
+            f"{root}: {len(stale)} parts of heads, poses or versions outside this plan{why} will be deleted",
         )
 
 

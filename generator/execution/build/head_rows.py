@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from generator.dataset.format.anchors_table import HeadAnchors
-from generator.dataset.format.heads_table import HeadRow
+from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
+from generator.errors import DatasetError
 from generator.execution.build.units import PlannedHead
 from generator.landmarks.topology import Topology
 
@@ -43,6 +45,7 @@ def head_row(planned: PlannedHead, mesh_path: str, topology: Topology) -> HeadRo
         anchor_residual_px=anchors.residual_px,
         anchor_residual_mm=anchors.residual_mm,
         anchor_asymmetry_mm=round(anchors.asymmetry_mm(topology), 6),
+        scene_camera=placement.scene_camera.numbers if placement.scene_camera else (),
         vertices=planned.vertices,
         triangles=planned.triangles,
         split=planned.split,
@@ -59,6 +62,18 @@ def head_anchors(planned: PlannedHead) -> HeadAnchors:
         weights=planned.anchors.weights,
         points=planned.points,
     )
+
+
+def changed_files(planned: Sequence[PlannedHead], root: Path) -> list[str]:
+    """Files of heads that are not as heads.parquet says, as it names them; none before a build has ended."""
+    if not (root / HEADS_FILE).exists():
+        return []
+    try:
+        recorded = dict(file for row in read_heads(root) for file in row.file_sha256)
+    except DatasetError:  # it is written anew, and decides nothing until then
+        return []
+    now = dict(file for head in planned for file in head.file_sha256)
+    return [name for name, sha256 in now.items() if recorded.get(name, sha256) != sha256]
 
 
 def relative(path: Path, root: Path) -> str:

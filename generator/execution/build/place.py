@@ -35,7 +35,8 @@ def place_heads(
     skipped = list(source.skipped)
     for missing in skipped:
         reporter.note(f"skipped {missing.subject}/{missing.expression}: {missing.reason}")
-    hashes = {str(file): file_hash(file) for head in source.heads for file in head.files}
+    files = dict.fromkeys(file for head in source.heads for file in head.files)
+    hashes = {str(file): file_hash(file) for file in files}
     kept = PlacedHeads(root, versions, hashes)
     orders = place_orders(source, config)
     if config.poses.frame == "canonical":

@@ -13,7 +13,8 @@ from typing import Any
 from generator.codec import from_plain
 from generator.dataset.format.build_files import RECEIPTS_FILE
 from generator.dataset.format.files import append_line, write_bytes
-from generator.dataset.format.part import PartInfo, check_part
+from generator.dataset.format.part import check_part
+from generator.dataset.format.part_info import PartInfo
 from generator.errors import DatasetError
 from generator.execution.build.unit_check import check_unit, unit_files
 from generator.messages import BuildOrder

@@ -12,9 +12,11 @@ from typing import Any, cast
 
 from generator import __version__, registries
 from generator.dataset.format.anchors_table import write_anchors
+from generator.dataset.format.columns import ImageMode
 from generator.dataset.format.files import unsynced, write_bytes
 from generator.dataset.format.heads_table import write_heads
 from generator.dataset.format.manifest import (
+    FAILURES_FILE,
     MANIFEST_FILE,
     Manifest,
     configuration_digest,
@@ -22,7 +24,6 @@ from generator.dataset.format.manifest import (
     write_manifest,
 )
 from generator.dataset.format.part_info import PartInfo
-from generator.dataset.format.schema import ImageMode
 from generator.dataset.show.card import write_card
 from generator.dataset.show.pictures import anchor_sheet, contact_sheet, detection_map
 from generator.errors import DatasetError
@@ -30,7 +31,6 @@ from generator.execution.build.chunks import chunk_poses
 from generator.execution.build.extend import carry_over, check_schema_of_parts, earlier_parts
 from generator.execution.build.folder import (
     ANCHOR_SHEET_FILE,
-    FAILURES_FILE,
     MAP_FILE,
     SHEET_FILE,
     Confirm,
@@ -46,7 +46,7 @@ from generator.execution.build.folder import (
     start_over,
     write_poses,
 )
-from generator.execution.build.head_rows import head_anchors, head_row, relative
+from generator.execution.build.head_rows import changed_files, head_anchors, head_row, relative
 from generator.execution.build.lock import Lock, locked
 from generator.execution.build.place import place_heads
 from generator.execution.build.placed_heads import lane_versions
@@ -168,7 +168,8 @@ def _build(
     receipts = Receipts(root)
     stale = stale_parts(root, orders)
     spare_skipped(stale, skipped, receipts)
-    ask_to_drop([part for part in stale if part not in earlier_parts(orders)], root, confirm)
+    gone = [part for part in stale if part not in earlier_parts(orders)]
+    ask_to_drop(gone, root, confirm, changed_files(planned, root) if gone else ())
     if carried := carry_over(orders, root, receipts):
         reporter.note(f"{carried} parts were taken over without being rendered again")
     begin(config, root)

@@ -9,10 +9,11 @@ from generator import registries
 from generator.errors import UsageError
 from generator.execution.build.folder import MADE_HEADS
 from generator.execution.status import Progress
-from generator.heads.head import HeadSource, Made, Maker, Wish
+from generator.heads.head import SCENE, HeadSource, Made, Maker, Wish
 from generator.heads.source import find_heads
 from generator.plan.config import BuildConfig
 from generator.plan.head_source import split_path
+from generator.plan.scenes import check_of_scenes
 
 
 def find_source(
@@ -40,7 +41,9 @@ def find_source(
         forward=heads.forward,
         eye_distance_mm=heads.eye_distance_mm,
         without=heads.without,
+        head_object=heads.head_object,
     )
+    check_of_scenes(config, any(head.source == SCENE for head in source.heads))
     if subjects is None:
         return source
     known = {head.subject for head in source.heads} | {head.subject for head in source.skipped}

@@ -14,10 +14,11 @@ import numpy as np
 
 from generator.codec import to_plain
 from generator.content import deciding
+from generator.errors import UsageError
 from generator.execution.build.chunks import Chunk, ChunkedPoses, Indices
 from generator.geometry.camera import Camera
 from generator.geometry.rotation import graphics_rotation
-from generator.heads.head import Head
+from generator.heads.head import SCENE, Head
 from generator.heads.placement import Placement
 from generator.landmarks.anchors import Anchors
 from generator.messages import BuildOrder
@@ -59,8 +60,10 @@ def assign_split(subject: str, validation: float) -> str:
 
 
 def head_camera(config: BuildConfig, placement: Placement) -> Camera:
-    """The camera that frames a head."""
-    return framed_camera(config.render, placement.radius_mm)
+    """The camera that frames a head. Raises UsageError: it is to be that of its scene, which has none."""
+    if config.render.scene_camera and placement.no_camera:
+        raise UsageError(f"--scene-camera: {placement.no_camera}; correct that in Blender, or remove it")
+    return framed_camera(config.render, placement.radius_mm, placement.scene_camera)
 
 
 def plan_units(
@@ -94,10 +97,12 @@ def plan_units(
                 "split": planned.split,
                 "settings": settings,
                 **({"without": head.without} if head.without else {}),
+                **({"scene": [head.head_object, head.shape_key]} if head.source == SCENE else {}),
             }
         )
         for chunk in poses.of(head.subject, head.expression):
-            views = plan_views(config, head.name, planned.placement.radius_mm, chunk.poses)
+            place = planned.placement
+            views = plan_views(config, head.name, place.radius_mm, chunk.poses, place.scene_camera)
             seen = [to_plain(views.cameras), to_plain(views.looks)]
             if any(views.seeds):
                 seen.append(list(views.seeds))
@@ -125,10 +130,10 @@ def _twin_orders(
     order: BuildOrder, planned: PlannedHead, chunk: Chunk, config: BuildConfig, fixed: str
 ) -> Iterator[BuildOrder]:
     """The orders of a unit's twins, one a factor: so a factor more is units more, and changes none."""
-    head, radius = order.head.name, planned.placement.radius_mm
+    head, place = order.head.name, planned.placement
     for factor, places in planned_twins(config, head, chunk.poses):
         poses = tuple(chunk.poses[k] for k in places)
-        views = plan_twins(config, head, radius, poses, factor)
+        views = plan_twins(config, head, place.radius_mm, poses, factor, place.scene_camera)
         seen = [to_plain(views.cameras), to_plain(views.looks), list(views.seeds)]
         now, before = (
             tuple(indices[k] for k in places) if indices else None

@@ -39,6 +39,8 @@ class LocalExecutor:
             folder = given.scratch / f"lane{k}"
             folder.mkdir()
             own = replace(given.options, scratch=str(folder), threads=min(len(cpus), most), cpus=cpus)
+            if own.gpu is not None:
+                own = replace(own, gpu=k)
             self._slots.append(LaneSlot(partial(LaneProcess, own)))
         # A lane ends with the thread that started it, so these threads live as long as the lanes.
         self._threads = ThreadPoolExecutor(self.workers)

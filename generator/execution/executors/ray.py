@@ -10,7 +10,7 @@ import os
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from generator.interpreter import guard_environment
 from generator.messages import BuildOrder, LaneOrder, from_json, to_json
 from generator.process import available_cores
 from generator.reading import parse_json
+from litert_faces.installing import install_command
 
 _HOME = Path(__file__).resolve().parents[3]
 
@@ -57,6 +58,8 @@ class LaneActor:
         own = LaneOptions(**{**values, "scratch": str(scratch), "cpus": (), "threads": 1})
         if core is not None:
             os.sched_setaffinity(0, {core})  # inherited by the render worker
+        if own.gpu is not None:
+            own = replace(own, gpu=core or 0)
         self._slot = LaneSlot(lambda: Lane(own))
 
     def run(self, order: str) -> str:
@@ -87,16 +90,23 @@ class RayExecutor:
     name = "ray"
 
     def __init__(self, circumstances: Circumstances) -> None:
-        workers, address = circumstances.workers, circumstances.address
+        with _environment_of_its_own():
+            self._join(circumstances.workers, circumstances.address)
+        remote: Any = self._ray.remote(num_cpus=1, max_restarts=-1, max_task_retries=ATTEMPTS - 1)(LaneActor)
+        given = json.dumps(asdict(circumstances.options))
+        self._actors = [remote.remote(given) for _ in range(self.workers)]
+        self._busy = False
+
+    def _join(self, workers: int | None, address: str | None) -> None:
+        """Start a Ray or join the one at the address."""
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        guard_environment()
         if address is None:
             # Read when ray is imported: a Ray that cannot be joined listens on 127.0.0.1 alone.
             os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
         try:
             import ray
         except ImportError as error:
-            raise UsageError("Ray is not installed: pip install 'headturn[cluster]'") from error
+            raise UsageError(f"Ray is not installed: {install_command('cluster')}") from error
         self._ray = ray
         if address is None:
             self.workers = workers or worthwhile(available_cores())
@@ -122,10 +132,6 @@ class RayExecutor:
             except (OSError, ValueError, RuntimeError) as error:
                 raise UsageError(f"--address {address}: no Ray cluster answers ({error})") from error
             self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
-        remote: Any = ray.remote(num_cpus=1, max_restarts=-1, max_task_retries=ATTEMPTS - 1)(LaneActor)
-        given = json.dumps(asdict(circumstances.options))
-        self._actors = [remote.remote(given) for _ in range(self.workers)]
-        self._busy = False
 
     def run(self, orders: Sequence[LaneOrder], on_image: OnImage) -> Iterator[Outcome]:
         """See the Executor protocol; frames are told of when their unit is done."""
@@ -183,6 +189,18 @@ def _answers(address: str) -> None:
     host, colon, port = address.rpartition(":")
     if colon and port.isdigit():
         socket.create_connection((host.removeprefix("ray://"), int(port)), ANSWER_S).close()
+
+
+@contextlib.contextmanager
+def _environment_of_its_own() -> Iterator[None]:
+    """What Ray starts takes no module from a current folder; a program that calls this keeps its own."""
+    before = os.environ.copy()
+    guard_environment()
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 @contextlib.contextmanager

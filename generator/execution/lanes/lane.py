@@ -8,6 +8,7 @@ the lane.
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import time
@@ -23,10 +24,11 @@ import numpy as np
 
 from generator.content import content_versions
 from generator.dataset.format.build_files import PLACED_FILE
-from generator.dataset.format.columns import further_column
-from generator.dataset.format.part import UnitRows, commit_unit
+from generator.dataset.format.columns import ImageMode, further_column
+from generator.dataset.format.part import commit_unit
 from generator.dataset.format.passes import passes_from_blender, passes_sha256, write_passes
-from generator.dataset.format.schema import ImageMode, part_schema
+from generator.dataset.format.schema import part_schema
+from generator.dataset.format.unit_rows import UnitRows
 from generator.errors import HeadError, WorkerError
 from generator.execution.lanes.labels import labelled_head
 from generator.execution.lanes.options import LaneOptions, OnImage
@@ -38,7 +40,9 @@ from generator.heads.mesh import HeadMesh
 from generator.heads.package import save_package
 from generator.heads.placement import Placement
 from generator.heads.read import read_mesh
+from generator.heads.scene import Eye
 from generator.heads.surroundings import head_alone
+from generator.landmarks.beside import Beside
 from generator.landmarks.detector import Detector, each_detector, open_detector
 from generator.landmarks.occlusion import shades, with_occlusion
 from generator.landmarks.shared import SharedAnchors, packaged
@@ -57,8 +61,9 @@ from generator.messages import (
 from generator.picture.scenery import Folders
 from generator.placing.placer import Placer
 from generator.plan.passes import SEGMENTATION
+from generator.plan.scenes import seen_look
 from generator.plan.settings import Landmarks
-from generator.plan.views import Views
+from generator.plan.views import View, Views
 from generator.process import resident_mib
 from generator.worn.wardrobe import Outfits, Wardrobe
 
@@ -82,13 +87,18 @@ class Lane:
     def __init__(self, options: LaneOptions) -> None:
         self._scratch = Path(options.scratch)
         self._memory_mib = options.memory_mib
-        self.renderer = self._open_renderer("frames", options, options.blender)
+        self.renderer = self._open_renderer("frames", options)
         self.shots = Shots(self.renderer)
+        if options.gpu is not None and not self.renderer.device:
+            self.renderer.close()
+            raise WorkerError("Blender finds no GPU here that Cycles can render on")
         self._places = self.renderer
-        if options.blender is not None and find_spec("bpy") is not None:
-            # Where a head stands is read off renders, and every Blender renders a little differently.
-            # With the same one for this, labels do not depend on the one that renders the images.
-            self._places = self._open_renderer("looks", options, None)
+        # Where a head stands is read off renders, and every Blender and GPU renders a little differently.
+        # With the same one for this, labels do not depend on the one that renders the images.
+        wheel = find_spec("bpy") is not None
+        same = replace(options, blender=None if wheel else options.blender, gpu=None)
+        if same != options:
+            self._places = self._open_renderer("looks", same)
         self._wardrobe = Wardrobe(self._scratch / "worn")
         self._detectors: dict[Landmarks, Detector] = {}
         self._loaded: tuple[Head, Placement, bool, bool] | None = None
@@ -98,7 +108,7 @@ class Lane:
         if isinstance(order, VersionsOrder):
             return Versions(self._versions(order.landmarks))
         if isinstance(order, PlaceOrder):
-            self._loaded = None
+            self._unload()
             return self.placer(order.landmarks, order.shared).subject(order.heads, order.frame)
         if isinstance(order, ShareOrder):
             return Shared(self.placer(order.landmarks).share(order.heads, order.placed))
@@ -168,14 +178,15 @@ class Lane:
         anchors = self.placer(landmarks).anchors(mesh, placement)
         return anchors.turned(graphics_rotation(placement.levelling))
 
-    def _open_renderer(self, folder: str, options: LaneOptions, blender: str | None) -> Renderer:
+    def _open_renderer(self, folder: str, options: LaneOptions) -> Renderer:
         images = self._scratch / folder
         images.mkdir(parents=True, exist_ok=True)
         return Renderer(
             images,
             self._scratch / "render.log",
-            blender=blender,
+            blender=options.blender,
             threads=options.threads,
+            gpu=options.gpu,
             deadline_s=options.deadline_s,
         )
 
@@ -210,6 +221,8 @@ class Lane:
                 )
             outfits = self._wardrobe.dress(order.head.name, self._mesh, order.anchors, views, order.things)
             visible = self._surface.visible(order.anchors, views) & ~outfits.hidden(order.anchors, views)
+            if self._beside is not None:
+                visible &= ~self._beside.hides(order.anchors, views)
         detectors = {name: self.detector(one) for name, one in each_detector(order.landmarks).items()}
         landmarks = {
             name: np.full((len(views), topology.count, 3), np.nan, dtype=np.float32) for name in detectors
@@ -220,13 +233,13 @@ class Lane:
         rendered = self.shots.start(package, views, folders, outfits.worn)
         for row, view in enumerate(views):
             with _timed(seconds, "wait for render"):
-                path = next(rendered)
+                one = next(rendered)
             with _timed(seconds, "encode"):
-                image = self.shots.finish(path, view)
+                image = self.shots.finish(one, view)
                 images.append(_encoded(image, suffix, flags))
             with _timed(seconds, "detect"):
-                for name, one in detectors.items():
-                    if (found := one.detect(image)) is not None:
+                for name, detector in detectors.items():
+                    if (found := detector.detect(image)) is not None:
                         landmarks[name][row] = found
             on_image()
         for _ in rendered:  # the worker's closing receipt
@@ -245,7 +258,7 @@ class Lane:
             angles_deg=views.angles_deg,
             indices=np.array(order.indices, dtype=np.int16).reshape(-1, 3),
             cameras=views.cameras,
-            looks=views.looks,
+            looks=views.looks if self._mesh.scene is None else tuple(map(seen_look, views.looks)),
             detected=np.isfinite(first).all(axis=(1, 2)),
             landmarks=first,
             anchors=order.anchors,
@@ -280,10 +293,20 @@ class Lane:
             some = views[few]
             rendered = self.renderer.render(package, some, passes=names, worn=outfits.worn[few])
             for view, path in zip(some, rendered, strict=True):
-                channels = passes_from_blender(path, names, view.camera.distance_mm)
+                channels = passes_from_blender(path, names, view.camera.distance_mm, self._eye(view))
                 write_passes(channels, path)
                 yield path.read_bytes(), passes_sha256(channels)
                 path.unlink()
+
+    def _eye(self, view: View) -> Eye | None:
+        """Where the render worker's camera stands in the world of the head's scene, if it has one."""
+        return self._mesh.scene.eye(view.camera) if self._mesh.scene else None
+
+    def _unload(self) -> None:
+        """Free what is known of the head before: parts of it know each other, and Python seldom looks for
+        such where few objects hold much memory."""
+        self._loaded = None
+        gc.collect()
 
     def _package(self, order: BuildOrder) -> Path:
         """The head of an order for its render worker; made once as long as it is the same."""
@@ -292,9 +315,10 @@ class Lane:
         tells, shaded = SEGMENTATION.name in order.passes, shades(order.views)
         wanted = head, placement, tells, shaded
         if wanted != self._loaded:
-            self._loaded = None
+            self._unload()
             mesh = placement.normalise(head_alone(self.read(head), placement))
             self._mesh, self._surface = mesh, Surface(mesh)
+            self._beside = Beside(mesh.scene, placement) if mesh.scene else None
             if shaded:
                 mesh = with_occlusion(mesh, self._surface)
             if tells:

@@ -15,6 +15,7 @@ from typing import Any
 from generator.errors import WorkerError
 from generator.interpreter import python_environment
 from generator.messages import from_json
+from generator.platforms import HERE
 
 LOG_TAIL_LINES = 3
 """Lines of the child's log that go into the one line of an error."""
@@ -46,8 +47,7 @@ class LineProcess:
                     env={**python_environment(), **(env or {})},
                     text=True,
                     encoding="utf-8",
-                    # Ctrl-C is for the host alone, which then ends its children in order.
-                    start_new_session=True,
+                    **HERE.own_group(),  # the host ends its children in order
                 )
         except OSError as error:
             raise WorkerError(f"cannot start {command[0]}: {error.strerror}") from error

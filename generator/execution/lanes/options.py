@@ -12,6 +12,10 @@ from generator.messages import LaneOrder, Receipt
 OnImage = Callable[[], None]
 """Called after each image; from any thread."""
 
+CPU, GPU, AUTO = DEVICES = ("cpu", "gpu", "auto")
+"""What lanes render on: all on one kind of processor, since each rounds a little differently. auto is a GPU
+where there is one."""
+
 DEADLINE_S = 300.0
 """Longest wait for one sign of life. Loading a large scan and its first image take seconds."""
 
@@ -21,7 +25,8 @@ class LaneOptions:
     """What a lane needs to know besides its orders.
 
     scratch: an existing folder of its own, best on a tmpfs. threads: of Cycles,
-    0 for every core. cpus: cores the lane and its render worker keep to.
+    0 for every core. gpu: render on a GPU, this lane on the one of its number; None: on the CPU.
+    cpus: cores the lane and its render worker keep to.
     deadline_s: a render worker that is silent for so long hangs.
     memory_mib: of the lane and its render worker together; 0 for no limit.
     """
@@ -29,6 +34,7 @@ class LaneOptions:
     scratch: str = ""
     blender: str | None = None
     threads: int = 0
+    gpu: int | None = None
     cpus: tuple[int, ...] = ()
     deadline_s: float = DEADLINE_S
     memory_mib: float = 0.0

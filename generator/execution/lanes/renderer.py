@@ -6,8 +6,9 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
@@ -23,6 +24,7 @@ from generator.messages import (
     OrderFailed,
     Rendered,
     RenderOrder,
+    SceneOrder,
     WorkerReady,
     expect,
     to_json,
@@ -30,17 +32,20 @@ from generator.messages import (
 from generator.plan.environment_light import EnvironmentLight
 from generator.plan.views import Views
 from generator.plan.wear import Worn
+from litert_faces.installing import install_command
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 
 OLDEST_BLENDER = (4, 2)
 
 
-def worker_command(blender: str | None, threads: int) -> list[str]:
+def worker_command(blender: str | None, threads: int, gpu: int | None = None) -> list[str]:
     """How a render worker is started: inside a Blender executable, or with the bpy wheel.
 
+    gpu: see :class:`generator.blender.devices.Device`.
     Raises UsageError if the executable does not exist, or bpy is not installed.
     """
+    words = [str(threads)] if gpu is None else [str(threads), str(gpu)]
     if blender is not None:
         if not os.access(blender, os.X_OK):
             raise UsageError(
@@ -48,13 +53,29 @@ def worker_command(blender: str | None, threads: int) -> list[str]:
             )
         script = str(_PACKAGE / "blender" / "worker.py")
         flags = ["--background", "--factory-startup", "--threads", str(threads)]
-        return [blender, *flags, "--python-exit-code", "1", "--python", script, "--", str(threads)]
+        return [blender, *flags, "--python-exit-code", "1", "--python", script, "--", *words]
     if find_spec("bpy") is None:
         raise UsageError(
-            "bpy is not installed: pip install 'headturn[build]' with Python 3.11, "
+            f"bpy is not installed: {install_command('build')} with Python 3.11, "
             "or name a Blender with --blender"
         )
-    return python_command("generator.blender.worker", str(threads))
+    _check_numpy()
+    return python_command("generator.blender.worker", *words)
+
+
+def _check_numpy() -> None:
+    """UsageError if numpy is one that the bpy wheel excludes: whatever was installed later, such as pandas,
+    may have replaced it, and pip only warns."""
+    try:
+        wanted = next((one for one in requires("bpy") or () if re.match(r"numpy\b", one)), "")
+    except PackageNotFoundError:
+        return  # a bpy that pip did not bring
+    below = re.search(r"<\s*(\d+)", wanted)
+    found = version("numpy")
+    if below and int(found.partition(".")[0]) >= int(below[1]):
+        raise UsageError(
+            f"bpy {version('bpy')} needs {wanted}, and numpy {found} is installed: {install_command('build')}"
+        )
 
 
 def check_blender(blender: str) -> None:
@@ -81,7 +102,10 @@ class Renderer:
     images: an existing folder, best on a tmpfs.
     blender: a Blender executable; None uses the bpy wheel.
     threads: Cycles threads; 0 means every core.
+    gpu: the number of its lane, to render on a GPU; None renders on the CPU.
     deadline_s: a worker that is silent for so long hangs, and is ended.
+
+    version: of its Blender, and the GPU that it renders on. device: that GPU; empty for the CPU.
     """
 
     def __init__(
@@ -91,6 +115,7 @@ class Renderer:
         *,
         blender: str | None = None,
         threads: int = 0,
+        gpu: int | None = None,
         deadline_s: float = DEADLINE_S,
     ) -> None:
         self.images = images
@@ -101,8 +126,11 @@ class Renderer:
             env["PYTHONPATH"] = ""  # nor our modules: its Python is another one
         # Blender's own temporary folder goes with ours, also when the worker is killed.
         env |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(images))
-        self._process = LineProcess(worker_command(blender, threads), log, env)
-        self.version = expect(WorkerReady, self._receive()).version
+        self._process = LineProcess(worker_command(blender, threads, gpu), log, env)
+        ready = expect(WorkerReady, self._receive())
+        self.device = ready.device
+        # Every processor rounds a little differently, as every Blender does.
+        self.version = f"{ready.version} on {ready.device}" if ready.device else ready.version
 
     @property
     def pid(self) -> int:
@@ -116,36 +144,50 @@ class Renderer:
         *,
         kind: Literal["bmp", "exr"] = "bmp",
         passes: Sequence[str] = (),
-        lights: tuple[EnvironmentLight | None, ...] = (),
         worn: tuple[tuple[Worn, ...], ...] = (),
     ) -> Iterator[Path]:
-        """Render views of a packaged head.
+        """Render views of a packaged head that have no backdrop of their own.
 
         kind: .bmp (sRGB) or .exr (linear float32).
         passes: render these, as .exr, instead of the picture; see generator.blender.passes.
-        lights, worn: see :class:`generator.messages.RenderOrder`.
+        worn: see :class:`generator.messages.RenderOrder`.
 
         Yields the path of each image as soon as it is written; the caller removes it.
         Raises HeadError if Blender cannot load the head, WorkerError if the worker dies.
         """
         kind = "exr" if passes else kind
-        self._send(RenderOrder(str(package), views, str(self.images), kind, tuple(passes), lights, worn))
-        receipts = self._receipts()
-        try:
+        order = RenderOrder(str(package), views, str(self.images), kind, tuple(passes), (), worn)
+        with closing(self._carried_out(order)) as receipts:
             for receipt in receipts:
                 yield Path(receipt.path)
-        except GeneratorExit:
-            # Whoever asks next must not get the rest of these.
-            for _ in receipts:
-                pass
 
-    def import_mesh(self, source: Path, folder: Path) -> Path:
+    def shoot(
+        self,
+        package: Path,
+        views: Views,
+        lights: tuple[EnvironmentLight | None, ...] = (),
+        worn: tuple[tuple[Worn, ...], ...] = (),
+    ) -> Iterator[Rendered]:
+        """As :meth:`render`, of any views: what is laid over a backdrop comes as its box alone.
+
+        lights: see :class:`generator.messages.RenderOrder`.
+        """
+        return self._carried_out(RenderOrder(str(package), views, str(self.images), "bmp", (), lights, worn))
+
+    def import_mesh(
+        self, source: Path, folder: Path, head_object: str | None = None, shape_key: str = ""
+    ) -> Path:
         """Have Blender read a mesh file and write it into folder as GLB, whose path is returned.
 
-        A JSON beside it says which image of a file each of those stands for that stand for one.
+        A JSON beside it says which image of a file each of those stands for that stand for one. Of a scene,
+        with the object or collection that is its head, it is a package.
         """
         target = folder / f"{source.stem}.glb"
-        self._send(ConvertOrder(str(source), str(target)))
+        order: ConvertOrder | SceneOrder = ConvertOrder(str(source), str(target))
+        if head_object is not None:
+            target = target.with_suffix(".npz")
+            order = SceneOrder(str(source), str(target), head_object, shape_key)
+        self._send(order)
         for _ in self._receipts():
             pass
         return target
@@ -158,11 +200,23 @@ class Renderer:
         """End the worker now."""
         self._process.kill()
 
-    def _send(self, order: RenderOrder | ConvertOrder) -> None:
+    def _send(self, order: RenderOrder | ConvertOrder | SceneOrder) -> None:
         self._process.send(to_json(order))
 
     def _receive(self) -> object:
         return self._process.receive_message(self._deadline_s)
+
+    def _carried_out(self, order: RenderOrder) -> Generator[Rendered, None, None]:
+        """Each image of an order, as soon as it is written."""
+        self._send(order)
+        receipts = self._receipts()
+        try:
+            for receipt in receipts:  # noqa: UP028 (yield from would close them)
+                yield receipt
+        except GeneratorExit:
+            # Whoever asks next must not get the rest of these.
+            for _ in receipts:
+                pass
 
     def _receipts(self) -> Iterator[Rendered]:
         """What comes until the order is done."""
@@ -173,19 +227,19 @@ class Renderer:
 
 
 @contextmanager
-def mesh_importer(blender: str | None = None) -> Iterator[Callable[[Path, Path], Path]]:
+def mesh_importer(blender: str | None = None) -> Iterator[Callable[..., Path]]:
     """:meth:`Renderer.import_mesh` of a worker that starts only if a mesh needs it."""
     with ExitStack() as stack:
         worker: Renderer | None = None
 
-        def import_mesh(source: Path, folder: Path) -> Path:
+        def import_mesh(source: Path, folder: Path, *scene: str) -> Path:
             nonlocal worker
             if worker is None:
                 scratch = stack.enter_context(scratch_folder())
                 worker = Renderer(scratch, scratch / "render.log", blender=blender)
                 stack.callback(worker.close)
             try:
-                return worker.import_mesh(source, folder)
+                return worker.import_mesh(source, folder, *scene)
             except WorkerError as error:
                 # A file that its importer does not survive is that head's; others get another worker.
                 stack.pop_all().close()

@@ -28,7 +28,7 @@ def scratch_folder() -> Iterator[Path]:
     A lock in it says that it is in use. Containers that share the tmpfs do not see each other's processes.
     """
     remove_leftovers()
-    folder, lock = _locked_folder(_base())
+    folder, lock = _locked_folder(frames_folder())
     try:
         yield folder
     finally:
@@ -39,7 +39,7 @@ def scratch_folder() -> Iterator[Path]:
 
 def remove_leftovers() -> None:
     """Remove the folders of processes that were killed."""
-    for left in _base().glob(f"{_PREFIX}*-*"):
+    for left in frames_folder().glob(f"{_PREFIX}*-*"):
         with suppress(OSError):  # somebody else's, gone by now, or with no lock that could tell
             if not _is_ours(left):
                 continue
@@ -71,7 +71,8 @@ def _is_ours(folder: Path) -> bool:
     return stat.S_ISDIR(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
 
 
-def _base() -> Path:
+def frames_folder() -> Path:
+    """The folder that scratch folders are made in."""
     if _TMPFS.is_dir() and os.access(_TMPFS, os.W_OK) and shutil.disk_usage(_TMPFS).free >= ENOUGH:
         return _TMPFS
     return Path(tempfile.gettempdir())

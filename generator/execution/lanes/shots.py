@@ -10,9 +10,11 @@ import numpy as np
 
 from generator.errors import WorkerError
 from generator.execution.lanes.renderer import Renderer
-from generator.picture.develop import developed
+from generator.messages import Rendered
+from generator.picture.develop import developed, softened
 from generator.picture.scenery import Folders, Scenery
 from generator.placing.rendering import read_image
+from generator.plan.render_settings import is_denoised
 from generator.plan.views import View, Views
 from generator.plan.wear import Worn
 
@@ -27,20 +29,25 @@ class Shots:
 
     def start(
         self, package: Path, views: Views, folders: Folders, worn: tuple[tuple[Worn, ...], ...] = ()
-    ) -> Iterator[Path]:
-        """The file of each view, for :meth:`finish`. Raises HeadError, also for an environment that is not
-        there; otherwise as :meth:`Renderer.render`."""
+    ) -> Iterator[Rendered]:
+        """What is left of each view, for :meth:`finish`. Raises HeadError, also for an environment that is
+        not there; otherwise as :meth:`Renderer.shoot`."""
         if folders != self._folders:
             self._folders, self._scenery = folders, Scenery(folders)
-        return self._renderer.render(package, views, lights=self._scenery.lights(views), worn=worn)
+        return self._renderer.shoot(package, views, self._scenery.lights(views), worn)
 
-    def finish(self, path: Path, view: View) -> np.ndarray:
-        """The picture that a file becomes, uint8 [H, W, 3], RGB; the file is removed.
+    def finish(self, rendered: Rendered, view: View) -> np.ndarray:
+        """The picture that it becomes, uint8 [H, W, 3], RGB; the file is removed.
 
         Raises WorkerError if it is none, or of another size, HeadError if a backdrop cannot be read.
         """
+        path = Path(rendered.path)
         if path.suffix == ".exr":
-            image = self._scenery.composed(_read_head(path, view), view)
+            left, right, bottom, top = rendered.box or (0, view.camera.width, 0, view.camera.height)
+            head = _read_head(path, (top - bottom, right - left))
+            if is_denoised(view.look):
+                head[..., 3] = softened(head[..., 3])
+            image = self._scenery.composed(head, (left, view.camera.height - top), view)
         else:
             image = read_image(path)
         if image.shape != (view.camera.height, view.camera.width, 3):
@@ -51,12 +58,12 @@ class Shots:
         self, package: Path, views: Views, folders: Folders, worn: tuple[tuple[Worn, ...], ...] = ()
     ) -> Iterator[np.ndarray]:
         """The pictures of some views, one after another."""
-        for view, path in zip(views, self.start(package, views, folders, worn), strict=True):
-            yield self.finish(path, view)
+        for view, rendered in zip(views, self.start(package, views, folders, worn), strict=True):
+            yield self.finish(rendered, view)
 
 
-def _read_head(path: Path, view: View) -> np.ndarray:
-    """A head over nothing, float16 or float32 [H, W, 4], linear, multiplied by alpha; the file is removed."""
+def _read_head(path: Path, size: tuple[int, int]) -> np.ndarray:
+    """A head over nothing, float [*size, 4], linear, multiplied by alpha; the file is removed."""
     import OpenEXR
 
     try:
@@ -66,6 +73,6 @@ def _read_head(path: Path, view: View) -> np.ndarray:
         raise WorkerError(f"{path}: the render worker left no readable image") from error
     finally:
         path.unlink(missing_ok=True)
-    if head.shape != (view.camera.height, view.camera.width, 4):
+    if head.shape != (*size, 4):
         raise WorkerError(f"{path}: the render worker left an image of another size")
     return head

@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 
 from generator.errors import DatasetError, HeadError, UsageError
+from generator.execution.build.units import head_camera
 from generator.execution.lanes.lane import Lane
 from generator.execution.lanes.options import LaneOptions
 from generator.execution.lanes.scratch import scratch_folder
 from generator.geometry.rotation import rotation_from_angles
-from generator.heads.head import NEUTRAL
+from generator.heads.head import NEUTRAL, SCENE
 from generator.heads.package import save_package
 from generator.heads.source import find_heads
 from generator.heads.surroundings import head_alone
@@ -23,6 +24,7 @@ from generator.landmarks.occlusion import shades, with_occlusion
 from generator.picture.scenery import folders_of
 from generator.picture.settled import settled
 from generator.plan.config import BuildConfig
+from generator.plan.scenes import check_of_scenes
 from generator.plan.view_plan import drawn_values, plan_views
 from generator.process import native_silence
 
@@ -72,7 +74,9 @@ def render_preview(
         forward=wanted.forward,
         eye_distance_mm=wanted.eye_distance_mm,
         without=wanted.without,
+        head_object=wanted.head_object,
     )
+    check_of_scenes(config, any(head.source == SCENE for head in source.heads))
     subjects = sorted({head.subject for head in source.heads})
     if not subjects:
         raise HeadError(f"{source.path}: {source.skipped[0].reason}")
@@ -87,7 +91,8 @@ def render_preview(
             mesh = lane.read(head)
             placement = lane.placer(config.detecting).face(head, mesh)
             package = scratch / "preview.npz"
-            views = plan_views(config, head.name, placement.radius_mm, [pose])
+            head_camera(config, placement)
+            views = plan_views(config, head.name, placement.radius_mm, [pose], placement.scene_camera)
             placed = placement.normalise(head_alone(mesh, placement))
             if shades(views):
                 placed = with_occlusion(placed)
