@@ -14,18 +14,29 @@ from types import ModuleType
 def _modules() -> tuple[ModuleType, ...]:
     """What is registered, in order. Imported when asked for: core/ is read where there is no bpy."""
     from . import (
+        build_lines,
         build_operators,
         command,
+        dropping,
         handlers,
+        keymap,
+        leaving,
         look_operators,
+        menus,
         operators,
         panel,
         preferences,
+        presets,
         properties,
+        selected,
+        setting_up,
+        turn,
+        waiting,
     )
 
-    buttons = operators, look_operators, build_operators
-    return properties, preferences, *buttons, panel, handlers, command
+    buttons = operators, turn, look_operators, build_operators, build_lines, waiting, setting_up, leaving
+    tab = dropping, presets, menus, selected, panel
+    return properties, preferences, *buttons, *tab, keymap, handlers, command
 
 
 def register() -> None:
@@ -36,8 +47,9 @@ def register() -> None:
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled, and when Blender ends."""
-    from . import session
+    from . import pictures, session
 
     session.forget()
+    pictures.clear()
     for module in reversed(_modules()):
         module.unregister()

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
@@ -14,6 +14,9 @@ from generator.errors import HeadturnError
 from . import building, session, settings, windows
 from .core.labels import one_line
 from .operators import source_is_named
+from .registration import registering
+
+STAYS = "What is finished stays, and building into the same folder goes on from there"
 
 LEFT_OUT = 3
 """Exit code of a build that finished with something left out."""
@@ -24,8 +27,6 @@ class BuildDataset(bpy.types.Operator):
 
     bl_idname = "headturn.build"
     bl_label = "Build"
-
-    _timer: Any = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -38,40 +39,26 @@ class BuildDataset(bpy.types.Operator):
         return source_is_named(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        session.state.error = ""
-        building.forget()
-        name = context.scene.name
-
-        def start() -> None:
-            try:
-                building.start(bpy.data.scenes[name])
-            except HeadturnError as error:
-                session.state.error = str(error)
-
-        session.with_host(start)
-        self._timer = context.window_manager.event_timer_add(0.1, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Once every 0.1 s, and on every event: Esc ends the build."""
-        build = building.current
-        if event.type == "ESC" and event.value == "PRESS" and build.runs:
-            build.cancel()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if building.poll():
-            windows.redraw()
-        if build.runs or session.state.checking:
-            return {"PASS_THROUGH"}
-        context.window_manager.event_timer_remove(self._timer)
-        if build.exit_code is None:
-            build.refused = True
-            self.report({"ERROR"}, one_line(session.state.error))
-        elif build.exit_code != 0 and not build.cancelled:
-            self.report({"WARNING" if build.exit_code == LEFT_OUT else "ERROR"}, one_line(build.headline()))
+        """From a button or a menu: start it, and let the user go on."""
+        try:
+            building.begin(context.scene.headturn)
+        except HeadturnError as error:
+            self.report({"ERROR"}, one_line(str(error)))
+            return {"CANCELLED"}
         windows.redraw()
+        return {"FINISHED"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """From a script: build to the end. Python gets a RuntimeError where there is no dataset then."""
+        build = building.current
+        try:
+            building.run(context.scene.headturn)
+        except HeadturnError as error:
+            build.refuse(str(error))
+        if build.exit_code not in (0, LEFT_OUT):
+            self.report({"ERROR"}, one_line(build.refused or build.headline()))
+            return {"CANCELLED"}
+        self.report({"INFO" if build.exit_code == 0 else "WARNING"}, one_line(build.headline()))
         return {"FINISHED"}
 
 
@@ -80,13 +67,19 @@ class CancelBuild(bpy.types.Operator):
 
     bl_idname = "headturn.cancel"
     bl_label = "Cancel"
+    in_menu = "Cancel Build"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return building.current.runs
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        text = {"title": "Stop the build?", "confirm_text": "Stop", "message": STAYS}
+        return context.window_manager.invoke_confirm(self, event, **text)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         building.current.cancel()
+        windows.redraw()
         return {"FINISHED"}
 
 
@@ -98,10 +91,10 @@ class ShowText(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return building.REPORT in bpy.data.texts
+        return bool(building.current.report)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        windows.open_window("TEXT_EDITOR", "text", bpy.data.texts[building.REPORT])
+        windows.open_window("TEXT_EDITOR", "text", building.report())
         return {"FINISHED"}
 
 
@@ -122,7 +115,7 @@ class LoadConfig(bpy.types.Operator, ImportHelper):
         except HeadturnError as error:
             self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
-        session.state.forget_heads()
+        session.state.error = ""
         studio.look_changed(context.scene)
         timeline.plan_changed(context.scene)
         return {"FINISHED"}
@@ -146,17 +139,10 @@ class SaveConfig(bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
-_CLASSES = (BuildDataset, CancelBuild, ShowText, LoadConfig, SaveConfig)
-
-
-def register() -> None:
-    """Add the buttons."""
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+register, _unregister = registering(BuildDataset, CancelBuild, ShowText, LoadConfig, SaveConfig)
 
 
 def unregister() -> None:
     """End what they started, and take them away."""
-    building.current.close()
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    building.close()
+    _unregister()

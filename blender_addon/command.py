@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .session import host_preference
+from .session import host_preference, set_up
 
 _registered: list[Any] = []
 
@@ -15,7 +15,7 @@ _registered: list[Any] = []
 def _run(arguments: list[str]) -> int:
     from .core import headless
 
-    return headless.run(arguments, preference=host_preference(), blender=bpy.app.binary_path)
+    return headless.run(arguments, preference=host_preference(), blender=bpy.app.binary_path, set_up=set_up())
 
 
 def register() -> None:

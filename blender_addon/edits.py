@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import bpy
 
-from . import session, windows
+from . import keys, own, session, windows
 from .session import Shown
 
 Update = Callable[[Shown, bpy.types.Context], None]
@@ -43,7 +43,7 @@ def look(shown: Shown) -> None:
 @_unless_quiet
 def look_seed(shown: Shown) -> None:
     """The seed of a look was typed."""
-    if shown.head is not None:
+    if own.head(shown) is not None:
         from . import looks
 
         looks.show(shown)
@@ -89,22 +89,22 @@ def choice(shown: Shown) -> None:
 
 @_unless_quiet
 def source(shown: Shown) -> None:
-    """Which heads there are: what was found no longer counts."""
-    session.state.forget_heads()
+    """Which heads there are: what was found of others is that of others."""
+    session.state.error = ""
 
 
 def choose_head(shown: Shown, place: int) -> None:
     """Show one of the gallery's heads."""
     from . import heads
 
-    heads.choose(shown, *session.state.heads[place])
+    heads.choose(shown, *keys.listing(shown).heads[place])
 
 
 def subjects(shown: Shown, context: bpy.types.Context, text: str) -> list[str]:
     """For the search of the field."""
-    return session.state.subjects()
+    return keys.listing(shown).subjects()
 
 
 def expressions(shown: Shown, context: bpy.types.Context, text: str) -> list[str]:
     """For the search of the field."""
-    return session.state.expressions(shown.subject)
+    return keys.listing(shown).expressions(shown.subject)

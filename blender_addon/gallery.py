@@ -8,10 +8,10 @@ from typing import Any
 
 import bpy
 
-from . import pictures, session
+from . import folders, keys, pictures, session
 from .core import gallery
 from .core.conversation import OnAnswer, Question
-from .core.state import HeadName
+from .core.found import HeadName
 from .session import Shown
 from .settings import chosen_head, to_config
 
@@ -24,32 +24,40 @@ _items: list[Item] = []
 
 def fill(shown: Shown) -> None:
     """Ask for the missing pictures around the shown head, the nearest first."""
-    cache = Path(bpy.utils.extension_path_user(__package__, path="thumbnails", create=True))
-    told = {"op": "thumbnail", "config": to_config(shown), "pixels": PIXELS, "cache": str(cache)}
+    config = to_config(shown)
+    source = keys.source(config)
+    cache = str(folders.lasting("thumbnails"))
+    told = {"op": "thumbnail", **folders.told(config), "pixels": PIXELS, "cache": cache}
     session.conversation.ask_later(
         Question(
             {**told, "subject": head[0], "expression": head[1]},
-            _keeper(head),
+            _keeper(source, head),
             lambda reason: None,  # said when that head is chosen
         )
-        for head in gallery.nearest(session.state.heads, chosen_head(shown))
-        if not pictures.kept(_key(head))
+        for head in gallery.nearest(keys.listing(shown).heads, chosen_head(shown))
+        if not pictures.kept(key_of(source, head))
     )
 
 
-def forget() -> None:
-    """Another source: its heads may have the same names."""
+def forget(source: str) -> None:
+    """A source is read anew: its heads may look different."""
     session.conversation.ask_later(())
-    pictures.forget_group(_GROUP)
+    pictures.forget_group(f"{_GROUP}{source}/")
 
 
 def items(shown: Shown, context: bpy.types.Context) -> list[Item]:
     """The heads around the shown one as an enumeration with pictures, in the source's order."""
     none = bpy.types.UILayout.bl_rna.functions["prop"].parameters["icon"].enum_items["USER"].value
-    heads = session.state.heads
+    heads, source = keys.listing(shown).heads, keys.source(to_config(shown))
     titles = gallery.titles(heads)
     _items[:] = [
-        (str(place), titles[place], "Show this head", pictures.icon(_key(heads[place])) or none, place)
+        (
+            str(place),
+            titles[place],
+            "Show this head",
+            pictures.icon(key_of(source, heads[place])) or none,
+            place,
+        )
         for place in gallery.window(heads, chosen_head(shown))
     ]
     return _items
@@ -57,18 +65,19 @@ def items(shown: Shown, context: bpy.types.Context) -> list[Item]:
 
 def chosen(shown: Shown) -> int:
     """Which of the items is shown."""
-    return gallery.place_of(session.state.heads, chosen_head(shown))
+    return gallery.place_of(keys.listing(shown).heads, chosen_head(shown))
 
 
-def _key(head: HeadName) -> str:
-    return f"{_GROUP}{'/'.join(head)}"
+def key_of(source: str, head: HeadName) -> str:
+    """Of a head's picture. source: see :func:`keys.source`."""
+    return f"{_GROUP}{source}/{'/'.join(head)}"
 
 
-def _keeper(head: HeadName) -> OnAnswer:
-    listed = session.state.heads
+def _keeper(source: str, head: HeadName) -> OnAnswer:
+    listed = session.state.lists.of(source)
 
     def take(answer: dict[str, Any]) -> None:
-        if session.state.heads is listed:
-            pictures.keep(_key(head), Path(answer["picture"]))
+        if session.state.lists.of(source) is listed:
+            pictures.keep(key_of(source, head), Path(answer["picture"]))
 
     return take

@@ -9,6 +9,7 @@ Takes the same arguments as ``headturn`` and ends with the same exit code.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
@@ -38,5 +39,6 @@ if __name__ == "__main__":
     code = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    # Blender would turn any exit code of ours into its own.
+    # Blender would turn any exit code of ours into its own, and tidies up only where it ends by itself.
+    shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
     os._exit(code)

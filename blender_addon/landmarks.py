@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import bpy
 
 from generator.plan.settings import Values
 
-from . import session, windows
+from . import folders, keys, own, session, windows
 from .core.conversation import OnAnswer
+from .core.found import Points
 from .session import Shown
-from .settings import chosen_head, pose, radius_mm, still_config
+from .settings import pose, radius_mm, still_config
 
 SETTLE_S = 0.15
 _wanted: list[str] = []
@@ -23,8 +22,7 @@ _wanted: list[str] = []
 
 def pose_changed(shown: Shown) -> None:
     """The points no longer fit; ask for new ones once the slider rests."""
-    session.state.landmarks = None
-    if not shown.show_landmarks or bpy.app.background:
+    if not shown.show_landmarks or bpy.app.background or keys.landmarks(shown) is not None:
         return
     _wanted[:] = [shown.id_data.name]
     if bpy.app.timers.is_registered(_ask):
@@ -44,15 +42,14 @@ def request_pictures(
 
     sheet: columns of a picture that shows all of them; 0 for none.
     """
-    folder = Path(tempfile.gettempdir()) / f"headturn-pictures-{shown.id_data.name}"
     message = {
         "op": "pictures",
-        "config": config,
+        **folders.told(config),
         "package": shown.package,
-        "head": "/".join(chosen_head(shown)),
+        "head": "/".join(keys.viewed(shown)),
         "radius_mm": radius_mm(shown),
         "poses": [list(angles) for angles in poses],
-        "folder": str(folder),
+        "folder": str(folders.scratch("pictures")),
         "landmarks": True,
         "sheet": sheet,
     }
@@ -63,12 +60,12 @@ def _ask() -> float | None:
     if session.conversation.is_busy:
         return SETTLE_S
     scene = bpy.data.scenes.get(_wanted[0])
-    if scene is None or scene.headturn.head is None or not scene.headturn.show_landmarks:
+    if scene is None or own.head(scene.headturn) is None or not scene.headturn.show_landmarks:
         return None
-    angles = pose(scene.headturn)
+    angles, key = pose(scene.headturn), keys.at_pose(scene.headturn)
 
     def take(answer: dict[str, Any]) -> None:
-        session.state.landmarks = (angles, answer["landmarks"][0])
+        session.state.landmarks.take(key, Points(answer["landmarks"][0]))
         windows.redraw_views()
 
     request_pictures(scene.headturn, still_config(scene.headturn), [angles], "", take)

@@ -7,9 +7,10 @@ from typing import Any
 
 import bpy
 
-from . import pictures, session, windows
+from . import own, pictures, session, windows
 from .core.looks import SHEET
 from .operators import SHEET_COLUMNS, there_is_a_head
+from .registration import registering
 
 
 class _Dice:
@@ -73,26 +74,15 @@ class OpenLooks(bpy.types.Operator):
 
     bl_idname = "headturn.open_looks"
     bl_label = "Open"
+    in_menu = "Open Sheet of Looks"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return pictures.LOOKS in bpy.data.images
+        return own.kept(bpy.data.images, pictures.LOOKS) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        windows.open_window("IMAGE_EDITOR", "image", bpy.data.images[pictures.LOOKS])
+        windows.open_window("IMAGE_EDITOR", "image", own.kept(bpy.data.images, pictures.LOOKS))
         return {"FINISHED"}
 
 
-_CLASSES = (RollTheDice, ShowLook, LookSheet, OpenLooks)
-
-
-def register() -> None:
-    """Add the buttons."""
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away."""
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = registering(RollTheDice, ShowLook, LookSheet, OpenLooks)

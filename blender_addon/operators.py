@@ -13,9 +13,10 @@ import bpy
 
 from generator.errors import HeadturnError
 
-from . import pictures, session, settings, windows
+from . import keys, own, pictures, session, settings, windows
 from .core.labels import one_line
 from .core.texts import asks_for_folder
+from .registration import registering
 
 EXTREMES = "Headturn extremes"
 SHEET_COLUMNS = 3
@@ -30,7 +31,8 @@ def source_is_named(cls: Any, context: bpy.types.Context) -> bool:
     return True
 
 
-def _nothing_is_due(cls: Any) -> bool:
+def nothing_is_due(cls: Any) -> bool:
+    """For a poll: does the host have time?"""
     if session.conversation.is_busy:
         cls.poll_message_set("Wait for what is going on")
         return False
@@ -39,7 +41,7 @@ def _nothing_is_due(cls: Any) -> bool:
 
 def there_is_a_head(cls: Any, context: bpy.types.Context) -> bool:
     """For a poll: is a head in view?"""
-    if context.scene.headturn.head is None:
+    if own.head(context.scene.headturn) is None:
         cls.poll_message_set("Load heads first")
         return False
     return True
@@ -50,6 +52,7 @@ class CheckHost(bpy.types.Operator):
 
     bl_idname = "headturn.check_host"
     bl_label = "Check"
+    in_menu = "Check the Python with Headturn"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.forget_host()
@@ -65,7 +68,7 @@ class LoadHeads(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return source_is_named(cls, context) and _nothing_is_due(cls)
+        return source_is_named(cls, context) and nothing_is_due(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import heads
@@ -79,6 +82,7 @@ class StepHead(bpy.types.Operator):
 
     bl_idname = "headturn.step_head"
     bl_label = "Step"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "INTERNAL"}
 
     what: bpy.props.EnumProperty(items=(("SUBJECT", "", ""), ("EXPRESSION", "", "")))  # type: ignore[valid-type]
     by: bpy.props.IntProperty(default=1)  # type: ignore[valid-type]
@@ -90,7 +94,7 @@ class StepHead(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not session.state.heads:
+        if not keys.listing(context.scene.headturn).heads:
             cls.poll_message_set("Load heads first")
             return False
         return True
@@ -141,18 +145,21 @@ class PreviewExtremes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _nothing_is_due(cls) and there_is_a_head(cls, context)
+        return nothing_is_due(cls) and there_is_a_head(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import landmarks
+        from .core import found
         from .core.grid import extremes
+
+        shown = context.scene.headturn
+        key = keys.of_plan(shown)
 
         def take(answer: dict[str, Any]) -> None:
             pictures.keep(pictures.SHEET, Path(answer["sheet"]))
             windows.keep_image(EXTREMES, answer["sheet"])
-            session.state.take_extremes(answer["landmarks"])
+            session.state.extremes.take(key, found.extremes(answer["landmarks"]))
 
-        shown = context.scene.headturn
         try:
             poses = extremes(settings.poses(shown))
         except HeadturnError as error:
@@ -170,27 +177,17 @@ class ShowSheet(bpy.types.Operator):
 
     bl_idname = "headturn.show_sheet"
     bl_label = "Open"
+    in_menu = "Open Extremes"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return EXTREMES in bpy.data.images
+        return own.kept(bpy.data.images, EXTREMES) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        windows.open_window("IMAGE_EDITOR", "image", bpy.data.images[EXTREMES])
+        windows.open_window("IMAGE_EDITOR", "image", own.kept(bpy.data.images, EXTREMES))
         return {"FINISHED"}
 
 
-_CLASSES = (CheckHost, LoadHeads, StepHead, ResetPose, LookThroughCamera, PreviewExtremes, ShowSheet)
-
-
-def register() -> None:
-    """Add the buttons."""
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away, with their pictures."""
-    pictures.clear()
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = registering(
+    CheckHost, LoadHeads, StepHead, ResetPose, LookThroughCamera, PreviewExtremes, ShowSheet
+)

@@ -8,13 +8,18 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
-from . import session
+from . import keys, own
 from .session import Shown
-from .settings import pose, radius_mm
+from .settings import radius_mm
 
 RED, GREEN, BLUE = (0.95, 0.2, 0.25, 1.0), (0.4, 0.8, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0)
 DOTS = (0.3, 1.0, 0.3, 1.0)
 LINE_WIDTH, DOT_SIZE = 2.5, 3.0
+"""Pixels at an interface scale of 1."""
+
+POINTS = "POINT_UNIFORM_COLOR" if bpy.app.version >= (4, 5, 0) else "UNIFORM_COLOR"
+"""Shader of points: Vulkan and Metal draw none of a size with one that is not made for them."""
+
 REACH = 1.25
 """Length of the axes in radii of the head."""
 
@@ -45,7 +50,7 @@ def head_axes(shown: Shown) -> list[Vector]:
 
 def _draw_axes() -> None:
     shown = bpy.context.scene.headturn
-    if shown.head is None or not shown.show_axes or not bpy.context.space_data.overlay.show_overlays:
+    if own.head(shown) is None or not shown.show_axes or not bpy.context.space_data.overlay.show_overlays:
         return
     import gpu
     from gpu_extras.batch import batch_for_shader
@@ -54,7 +59,7 @@ def _draw_axes() -> None:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region = bpy.context.region
     shader.uniform_float("viewportSize", (region.width, region.height))
-    shader.uniform_float("lineWidth", LINE_WIDTH)
+    shader.uniform_float("lineWidth", LINE_WIDTH * _scale())
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("ALPHA")
     for end, color in zip(ends, (RED, GREEN, BLUE), strict=True):
@@ -64,23 +69,26 @@ def _draw_axes() -> None:
 
 
 def _draw_landmarks() -> None:
-    shown, found = bpy.context.scene.headturn, session.state.landmarks
-    if shown.head is None or not shown.show_landmarks or found is None:
-        return
-    angles, points = found
+    shown = bpy.context.scene.headturn
+    found = keys.landmarks(shown) if shown.show_landmarks else None
     frame = _camera_frame()
-    if points is None or angles != pose(shown) or frame is None:
+    if found is None or found.points is None or frame is None:
         return
     import gpu
     from gpu_extras.batch import batch_for_shader
 
     left, bottom, width, height = frame
     side = shown.render_resolution
-    places = [(left + x / side * width, bottom + (1 - y / side) * height) for x, y in points]
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    places = [(left + x / side * width, bottom + (1 - y / side) * height) for x, y in found.points]
+    shader = gpu.shader.from_builtin(POINTS)
     shader.uniform_float("color", DOTS)
-    gpu.state.point_size_set(DOT_SIZE)
+    gpu.state.point_size_set(DOT_SIZE * _scale())
     batch_for_shader(shader, "POINTS", {"pos": places}).draw(shader)
+
+
+def _scale() -> float:
+    scale: float = bpy.context.preferences.system.ui_scale
+    return scale
 
 
 def _camera_frame() -> tuple[float, float, float, float] | None:

@@ -7,9 +7,10 @@ from typing import Any
 
 import bpy
 
-from . import session
+from . import session, setting_up
 from .core.panel import Line
-from .wrapping import message
+from .registration import WORDS
+from .wrapping import label, message
 
 MARGIN = 16
 """Characters that the page's indents take."""
@@ -26,9 +27,10 @@ class HeadturnPreferences(bpy.types.AddonPreferences):
 
     python: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Python with Headturn",
+        translation_context=WORDS,
         description=(
             "A Python, or the folder of its environment, in which Headturn is installed. Empty: "
-            "HEADTURN_PYTHON, then headturn on PATH"
+            "HEADTURN_PYTHON, then what Set Up made, then headturn on PATH"
         ),
         subtype="FILE_PATH",
         update=_python_changed,
@@ -36,8 +38,6 @@ class HeadturnPreferences(bpy.types.AddonPreferences):
 
     def draw(self, context: bpy.types.Context) -> None:
         """The page."""
-        from .core.host import INSTALL
-
         layout, state = self.layout, session.state
         layout.use_property_split = True
         row = layout.row(align=True)
@@ -45,17 +45,19 @@ class HeadturnPreferences(bpy.types.AddonPreferences):
         row.operator("headturn.check_host", text="Check", icon="CHECKMARK")
         box = layout.box().column(align=True)
         if state.checking:
-            box.label(text="asking...", icon="SORTTIME")
+            label(box, "asking...", "SORTTIME")
         elif state.host_error:
             message(box, context, Line(state.host_error, "ERROR"), margin=MARGIN)
         elif state.facts is not None and state.host is not None:
             found = f"{state.host.command[0]} ({state.host.found_by})"
             message(box, context, Line(found, "CHECKMARK"), margin=MARGIN)
             for line in state.facts.lines():
-                box.label(text=line, icon="BLANK1")
+                label(box, line, "BLANK1")
         else:
-            box.label(text="Not checked yet. To install:", icon="INFO")
-            box.label(text=INSTALL, icon="BLANK1")
+            label(box, "Not checked yet", "INFO")
+        box = layout.box()
+        setting_up.draw(box, context, margin=MARGIN)
+        setting_up.draw_commands(box.column(align=True))
 
 
 def register() -> None:

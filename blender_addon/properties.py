@@ -6,11 +6,23 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    IntVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from . import edits, gallery
 from .core.field import Field
 from .core.fields import fields
+from .core.units import angle_of, angle_options, degrees, radians
+from .core.words import LIMITS
+from .registration import WORDS
+from .session import Shown, quiet
 
 _FOLLOWS: dict[str, edits.Update] = {
     "heads": edits.source,
@@ -22,7 +34,12 @@ _FOLLOWS: dict[str, edits.Update] = {
 """What follows when a setting is edited, by section, or by setting where it is something else."""
 
 
-def _angle(name: str, description: str, limit: float) -> Any:
+ANGLES = "yaw", "pitch", "roll"
+"""Of the pose in view."""
+
+
+def _angle(name: str, description: str) -> Any:
+    limit = LIMITS[f"poses.{name.lower()}"]
     return FloatProperty(
         name=name,
         description=description,
@@ -41,6 +58,10 @@ def _shown() -> dict[str, Any]:
     return {
         "head": PointerProperty(type=bpy.types.Object),
         "package": StringProperty(),
+        "listed": StringProperty(),  # JSON of the heads of a source; see keys.listing
+        "placed": StringProperty(),  # JSON of the head in view; see keys.placed
+        "came_from": PointerProperty(type=bpy.types.Scene),  # of the studio: the user's own
+        "frames": IntVectorProperty(size=3),  # start, end, current before the timeline
         "radius": StringProperty(),  # mm as text: Blender's numbers have 32 bits, and the distance follows
         "subject": StringProperty(
             name="Subject",
@@ -61,9 +82,9 @@ def _shown() -> dict[str, Any]:
             get=gallery.chosen,
             set=edits.choose_head,
         ),
-        "yaw": _angle("Yaw", "Turn: above zero the nose goes to image left. Degrees", 89.9),
-        "pitch": _angle("Pitch", "Nod: above zero the nose goes up. Degrees", 180),
-        "roll": _angle("Roll", "Tilt: above zero the crown goes to image right. Degrees", 180),
+        "yaw": _angle("Yaw", "Turn: above zero the nose goes to image left. Degrees"),
+        "pitch": _angle("Pitch", "Nod: above zero the nose goes up. Degrees"),
+        "roll": _angle("Roll", "Tilt: above zero the crown goes to image right. Degrees"),
         "snap": BoolProperty(
             name="Snap to Grid", description="Sliders stop at the poses of the grid only", update=edits.pose
         ),
@@ -75,6 +96,12 @@ def _shown() -> dict[str, Any]:
         "show_axes": BoolProperty(
             name="Axes",
             description="Draw the head's frame: red to its left, green up, blue to the front",
+            default=True,
+            update=edits.overlay,
+        ),
+        "show_rings": BoolProperty(
+            name="Rings",
+            description="Draw three rings about the head that turn it: red is pitch, green yaw, blue roll",
             default=True,
             update=edits.overlay,
         ),
@@ -128,12 +155,37 @@ def _update(field: Field) -> dict[str, Any]:
     return {} if found is None else {"update": found}
 
 
+def _angles(made: dict[str, Any]) -> dict[str, Any]:
+    """Beside each property that is an angle, the one in radians that shows it."""
+    names = [*ANGLES, *(field.name for field in fields() if field.is_angle)]
+    return {angle_of(name): _in_radians(name, made[name]) for name in names}
+
+
+def _in_radians(name: str, made: Any) -> Any:
+    def get(shown: Shown) -> Any:
+        return radians(_numbers(getattr(shown, name)))
+
+    def set(shown: Shown, value: Any) -> None:
+        with quiet():
+            setattr(shown, name, degrees(_numbers(value), _numbers(getattr(shown, name))))
+
+    options = angle_options(made.keywords)
+    return made.function(get=get, set=set, update=made.keywords["update"], **options)
+
+
+def _numbers(value: Any) -> Any:
+    return value if isinstance(value, float) else tuple(value)
+
+
 _registered: list[type] = []
 
 
 def register() -> None:
     """Add scene.headturn. Angles in degrees, lengths in millimetres, colours sRGB."""
-    properties = {"__annotations__": {**_shown(), **_settings()}, "__module__": __name__}
+    every = {**_shown(), **_settings()}
+    every |= _angles(every)
+    said = {name: one.function(**one.keywords, translation_context=WORDS) for name, one in every.items()}
+    properties = {"__annotations__": said, "__module__": __name__}
     made = type("HeadturnSettings", (bpy.types.PropertyGroup,), properties)
     bpy.utils.register_class(made)
     _registered.append(made)

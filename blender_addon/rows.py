@@ -11,8 +11,12 @@ from .core.numbers import Number
 from .core.panel import Row
 from .core.texts import Source, asks_for_folder
 from .session import Shown
+from .wrapping import label
 
 Draw = Callable[[bpy.types.UILayout, Shown, Row], None]
+
+NAMES = 0.22
+"""Share of the width that the names of ranges take."""
 
 
 def draw_rows(layout: bpy.types.UILayout, shown: Shown, rows: Iterable[Row]) -> None:
@@ -29,7 +33,7 @@ def draw_rows(layout: bpy.types.UILayout, shown: Shown, rows: Iterable[Row]) -> 
 
 
 def _plain(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
-    layout.prop(shown, row.field.name)
+    layout.prop(shown, row.field.drawn)
 
 
 def _number(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
@@ -38,16 +42,26 @@ def _number(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
         layout.prop(shown, switch)
         layout = layout.row(align=True)
         layout.enabled = not getattr(shown, switch)
-    layout.prop(shown, row.field.name)
+    layout.prop(shown, row.field.drawn)
 
 
 def _numbers(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
-    line = layout.row(align=True)
     if not row.parts:
-        _number(line, shown, row)
+        _number(layout.row(align=True), shown, row)
         return
+    if row.header:
+        cells = _columns(layout, "")
+        for word in row.header:
+            label(cells, word)
+    cells = _columns(layout, row.field.words["name"])
     for place in range(row.parts):
-        line.prop(shown, row.field.name, index=place, **({"text": "to"} if place else {}))
+        cells.prop(shown, row.field.drawn, index=place, text="")
+
+
+def _columns(layout: bpy.types.UILayout, name: str) -> bpy.types.UILayout:
+    line = layout.split(factor=NAMES, align=True)
+    label(line, name)
+    return line.row(align=True)
 
 
 def _expanded(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
@@ -55,7 +69,8 @@ def _expanded(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
 
 
 def _flags(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:
-    layout.column(align=True).prop(shown, row.field.name)
+    label(layout, row.field.words["name"])
+    layout.grid_flow(columns=2, even_columns=True, align=True).prop(shown, row.field.name)
 
 
 def _source(layout: bpy.types.UILayout, shown: Shown, row: Row) -> None:

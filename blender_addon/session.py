@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from . import windows
+from generator import __version__
+
+from . import folders, windows
 from .core.conversation import Conversation, Look, OnAnswer, Server
 from .core.state import State
 
@@ -24,6 +26,7 @@ Shown = Any
 """scene.headturn: its properties are made when Blender starts, so no type checker knows them."""
 
 _quiet: list[None] = []
+_missing: list[bool] = []
 
 
 @contextmanager
@@ -54,12 +57,18 @@ def with_host(then: Callable[[], None]) -> None:
     conversation.with_host(then, _look())
 
 
-def host_command(arguments: list[str]) -> list[str]:
-    """The command line of the host that was found."""
+def find_host() -> None:
+    """The same, but wait for it. Raises HeadturnError."""
+    conversation.find_now(_look())
+
+
+def host_command(arguments: list[str], *, scene: bool = False) -> list[str]:
+    """The command line of the host that was found. scene: it may render one that this Blender saved."""
     from .core.host import host_command
 
     host, facts = _host()
-    return host_command(host, facts, arguments, bpy.app.binary_path)
+    saved_by = bpy.app.version[:2] if scene else None
+    return host_command(host, facts, arguments, bpy.app.binary_path, saved_by)
 
 
 def host_preference() -> str:
@@ -70,9 +79,35 @@ def host_preference() -> str:
     return bpy.path.abspath(addon.preferences.python) if addon.preferences.python else ""
 
 
+def set_up() -> Path | None:
+    """The environment that Set Up made for this release; None if there is none, or no extension either."""
+    from .core.set_up import is_ready
+
+    try:
+        folder = folders.environment()
+    except ValueError:  # enabled in a way that extensions are not
+        return None
+    return folder if is_ready(folder, __version__) else None
+
+
+def host_is_missing() -> bool:
+    """Is there plainly no host? Looked for once, without asking it anything."""
+    from .core.host import HostMissing, find_host
+
+    if not _missing:
+        try:
+            find_host(host_preference(), None, set_up=set_up())
+        except HostMissing:
+            _missing.append(True)
+        else:
+            _missing.append(False)
+    return _missing[0]
+
+
 def forget_host() -> None:
     """The preference changed: what was found no longer counts."""
     _stop_ticking()
+    _missing.clear()
     conversation.forget_host()
 
 
@@ -80,6 +115,7 @@ def forget() -> None:
     """The extension is disabled: what was found no longer counts."""
     forget_host()
     state.forget()
+    folders.remove_scratch()
 
 
 def tick() -> float | None:
@@ -88,13 +124,13 @@ def tick() -> float | None:
 
 
 def _look() -> Look:
-    preference, blend = host_preference(), bpy.data.filepath
+    preference, blend, made = host_preference(), bpy.data.filepath, set_up()
     beside = Path(blend).parent if blend else None
 
     def look() -> tuple[Host, HostFacts]:
         from .core.host import check_host, find_host
 
-        host = find_host(preference, beside)
+        host = find_host(preference, beside, set_up=made)
         return host, check_host(host)
 
     return look
@@ -108,12 +144,12 @@ def _host() -> tuple[Host, HostFacts]:
 def _start_server() -> Server:
     from .core.process import HostProcess
 
-    return HostProcess(host_command(["preview-server"]))
+    return HostProcess(host_command(["preview-server"], scene=True))
 
 
 def _start_ticking() -> None:
     if not bpy.app.timers.is_registered(tick):
-        bpy.app.timers.register(tick, first_interval=TICK_S)
+        bpy.app.timers.register(tick, first_interval=TICK_S, persistent=True)
     windows.redraw()
 
 

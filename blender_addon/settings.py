@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from .core.config import read_config, write_config
 from .core.draws import draws_something, with_draws, without_draws
 from .core.field import Get
 from .core.fields import fields
-from .core.state import HeadName
+from .core.found import HeadName
 from .core.tables import Sections, check_shown, configuration, located, properties_of, section_of
 from .session import Shown, quiet
 
@@ -102,9 +101,11 @@ def chosen_head(shown: Shown) -> HeadName:
     return shown.subject, shown.expression
 
 
-def cache_folder() -> Path:
-    """Where prepared and parametric heads are kept while Blender runs."""
-    return Path(bpy.app.tempdir or tempfile.gettempdir()) / "headturn"
+def is_of_scene(shown: Shown) -> bool:
+    """Are the heads in a .blend?"""
+    from generator.heads.head import is_scene
+
+    return is_scene(str(to_config(shown).get("heads", {}).get("source", "")))
 
 
 def absolute(path: str) -> str:

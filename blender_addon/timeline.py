@@ -12,9 +12,9 @@ import bpy
 from generator.errors import HeadturnError
 from generator.plan.settings import Poses
 
-from . import session, settings, studio
+from . import folders, keys, own, session, settings, studio
+from .core.found import HeadName
 from .core.grid import NotDrawn, has_own, plan_poses, remember
-from .core.state import HeadName
 from .session import Shown
 
 if TYPE_CHECKING:
@@ -25,20 +25,31 @@ _files = count()
 
 
 def plan_changed(scene: bpy.types.Scene) -> None:
-    """Lay the plan on the timeline, or leave the timeline alone."""
+    """Lay the plan on the timeline, or leave the timeline as it was before."""
     shown = scene.headturn
-    if not shown.on_timeline:
+    if not shown.on_timeline or own.head(shown) is None:
+        _give_back(scene)
         return
     _asked.clear()
     plan = _plan(shown)
     if plan is None:
         return
     frames = len(plan)
+    if not shown.is_property_set("frames"):
+        shown.frames = scene.frame_start, scene.frame_end, scene.frame_current
     scene.frame_start, scene.frame_end = 1, frames
     if not 1 <= scene.frame_current <= frames:
         scene.frame_set(1)
     show_frame(scene)
     _fit_timelines(scene)
+
+
+def _give_back(scene: bpy.types.Scene) -> None:
+    shown = scene.headturn
+    if shown.is_property_set("frames"):
+        scene.frame_start, scene.frame_end, current = shown.frames
+        shown.property_unset("frames")
+        scene.frame_set(current)
 
 
 def head_changed(scene: bpy.types.Scene) -> None:
@@ -69,7 +80,7 @@ def _fit_timelines(scene: bpy.types.Scene) -> None:
 
 def _plan(shown: Shown) -> PosePlan | None:
     """The poses; None while the host draws them, or if they make no sense, which the panel says."""
-    poses, head = settings.poses(shown), session.state.displayed or settings.chosen_head(shown)
+    poses, head = settings.poses(shown), keys.viewed(shown)
     try:
         return plan_poses(poses, head)
     except NotDrawn:
@@ -83,7 +94,7 @@ def _have_drawn(shown: Shown, poses: Poses, head: HeadName) -> None:
     if (poses, head) in _asked:  # asked for, or refused, which the panel says
         return
     _asked.append((poses, head))
-    file, name = settings.cache_folder() / f"poses-{next(_files)}.npy", shown.id_data.name
+    file, name = folders.scratch("poses") / f"{next(_files)}.npy", shown.id_data.name
 
     def take(answer: dict[str, Any]) -> None:
         remember(poses, head, Path(file))

@@ -8,6 +8,8 @@ from typing import Any
 
 import bpy
 
+from . import own
+
 
 def redraw() -> None:
     """Redraw what shows words: the sidebars and the preferences. The 3D views stay: they cost most."""
@@ -29,11 +31,16 @@ def redraw_views() -> None:
 
 def keep_image(name: str, path: str) -> None:
     """Have the file at path as the image of this name, read anew."""
-    image = bpy.data.images.get(name)
+    image = own.kept(bpy.data.images, name)
     if image is None:
         image = bpy.data.images.load(path)
+        own.keep(image, name)
         image.name = name
+    if image.packed_files:
+        image.unpack(method="REMOVE")
+    image.filepath = path
     image.reload()
+    image.pack()
 
 
 def open_window(kind: str, slot: str, what: Any) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Messages of several lines: Blender's labels do not wrap."""
+"""Words of ours in a layout: Blender's labels do not wrap, and it would translate some."""
 
 from __future__ import annotations
 
@@ -18,4 +18,9 @@ def message(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line, 
     characters = max(16, int(context.region.width / scale / WIDTH_PER_CHARACTER) - margin)
     column = layout.column(align=True)
     for number, text in enumerate(wrapped(line.text, characters)):
-        column.label(text=text, icon=line.icon if number == 0 else "BLANK1")
+        label(column, text, line.icon if number == 0 else "BLANK1")
+
+
+def label(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
+    """One line, in the language that it is written in."""
+    layout.label(text=text, icon=icon, translate=False)

@@ -3,18 +3,22 @@
 
     python scripts/build_extension.py [--out dist]
 
-Needs no Blender and nothing but the standard library. The generator's modules go
-in as a private package of the extension, with their imports made relative, so
-that one code base serves both and nothing is added to Blender's module path.
-The same sources give the same bytes.
+Needs no Blender, and beside the standard library pip and the setuptools of pyproject.toml. The generator's
+modules go in as a private package of the extension, with their imports made relative, so that one code base
+serves both and nothing is added to Blender's module path. The wheel of this release goes in as a file, which
+Set Up installs outside of Blender. The same sources give the same bytes.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import io
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -25,6 +29,9 @@ FOLLOWED = ("DRAWS",)
 """Registries whose entries the extension uses; it knows the names alone of those in the others."""
 
 _IMPORT = re.compile(r"^(\s*)from generator(\.[\w.]+)? import ", re.MULTILINE)
+PACKED = ("generator", "downstream_hpe", "litert_faces", "LICENSES", "README.md", "pyproject.toml")
+"""What the wheel is made of."""
+
 _DATE = (2020, 1, 1, 0, 0, 0)
 _SKIPPED = ("README.md",)
 
@@ -62,13 +69,43 @@ def extension_files() -> dict[str, bytes]:
     return dict(sorted(files.items()))
 
 
-def write_extension(folder: Path) -> Path:
+def wheel() -> tuple[str, bytes]:
+    """Name and content of the wheel of the checkout.
+
+    Made of a copy: what an earlier build left beside the sources would go in. Its date and modes are those of
+    the files, so it is packed anew.
+    """
+    with tempfile.TemporaryDirectory() as work:
+        for name in PACKED:
+            path, copy = ROOT / name, Path(work, "tree", name)
+            if path.is_dir():
+                shutil.copytree(path, copy, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                copy.parent.mkdir(exist_ok=True)
+                shutil.copy(path, copy)
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "-q"]
+        made = [*pip, "--no-deps", "--no-build-isolation", "--wheel-dir", work, str(Path(work, "tree"))]
+        if subprocess.run(made, check=False).returncode:
+            sys.exit("build_extension.py: no wheel; it needs pip and setuptools: make extension brings them")
+        [path] = Path(work).glob("*.whl")
+        with zipfile.ZipFile(path) as archive:
+            return path.name, packed({name: archive.read(name) for name in archive.namelist()})
+
+
+def packed(files: dict[str, bytes]) -> bytes:
+    """A zip that depends on names and contents alone."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name, _DATE), content, zipfile.ZIP_DEFLATED)
+    return out.getvalue()
+
+
+def write_extension(folder: Path, *, with_wheel: bool = True) -> Path:
     """Write headturn-<version>.zip into folder."""
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / f"headturn-{generator_version()}.zip"
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in extension_files().items():
-            archive.writestr(zipfile.ZipInfo(name, _DATE), content, zipfile.ZIP_DEFLATED)
+    target.write_bytes(packed({**extension_files(), **dict([wheel()] if with_wheel else [])}))
     return target
 
 
@@ -112,7 +149,9 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Write the Blender extension.")
     parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder of the zip")
-    print(write_extension(parser.parse_args().out))
+    parser.add_argument("--without-wheel", action="store_true", help="Set Up will not work")
+    given = parser.parse_args()
+    print(write_extension(given.out, with_wheel=not given.without_wheel))
 
 
 if __name__ == "__main__":

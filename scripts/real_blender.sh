@@ -56,6 +56,7 @@ cat >"$base/run-$suite" <<EOF
 export HEADTURN_OUTSIDE=\$PPID
 exec unshare --mount --propagation private bash -c '
     root=\$1; shift
+    PATH=\$PATH:/usr/sbin  # where chroot is; a host that a Blender started has a short one
     for folder in /*; do
         case \$folder in
             /bin | /boot | /etc | /lib* | /opt | /run | /sbin | /sys | /usr | /var) continue ;;

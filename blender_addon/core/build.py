@@ -49,18 +49,19 @@ class Process(Protocol):
 
 @dataclass
 class Build:
-    """The build that runs, or ran last. Not saved with the file.
+    """The build that runs, or ran last. It belongs to this Blender, not to the file that is open.
 
-    refused: it did not even start. newest: the image that was written last. report: what it came to, as a
-    text of some lines; "" before it has ended.
+    starting: the host is looked for. refused: why it did not even start. newest: the image that was written
+    last. report: what it came to, as a text of some lines; "" before it has ended.
     """
 
     out: Path | None = None
+    starting: bool = False
     process: Process | None = None
     progress: Progress = field(default_factory=Progress)
     exit_code: int | None = None
     cancelled: bool = False
-    refused: bool = False
+    refused: str = ""
     newest: Path | None = None
     report: str = ""
     _last_line: str = ""
@@ -68,23 +69,33 @@ class Build:
 
     @property
     def runs(self) -> bool:
-        """Has it started and not ended?"""
-        return self.process is not None
+        """Was it asked for, and has not ended?"""
+        return self.starting or self.process is not None
+
+    def expect(self, out: Path) -> None:
+        """A process that builds into the folder out will be there once there is a host."""
+        self.forget()
+        self.starting, self.out = True, out
 
     def start(self, process: Process, out: Path) -> None:
         """Follow a process that builds into the folder out."""
         self.forget()
         self.process, self.out = process, out
 
+    def refuse(self, reason: str) -> None:
+        """It cannot start."""
+        self.starting, self.refused = False, reason
+
     def forget(self) -> None:
         """What the last build came to no longer counts."""
-        self.exit_code, self.cancelled, self.refused = None, False, False
+        self.starting, self.exit_code, self.cancelled, self.refused = False, None, False, ""
         self.progress, self.newest, self.report, self._last_line = Progress(), None, "", ""
 
     def cancel(self) -> None:
         """Ask the host to end; what is finished stays, and building again continues."""
+        self.cancelled = self.runs
+        self.starting = False
         if self.process is not None:
-            self.cancelled = True
             self.process.interrupt()
 
     def poll(self) -> bool:
@@ -104,6 +115,7 @@ class Build:
 
     def close(self) -> None:
         """End it, because Blender ends or the extension is disabled."""
+        self.starting = False
         if self.process is not None:
             self.process.close()
             self.process = None

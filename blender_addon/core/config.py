@@ -13,18 +13,20 @@ import json
 import os
 import struct
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from generator.errors import UsageError
-from generator.plan.settings import SECTIONS, Values
+from generator.plan.settings import SECTIONS, Values, all_settings
 from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 
 
 def read_config(path: Path) -> Values:
     """The tables of a configuration file.
 
-    Raises UsageError: it cannot be read, is not TOML, or holds something else.
+    Raises UsageError: it cannot be read, is not TOML, or holds something else. A key that
+    nobody knows is said as the host says it.
     """
     try:
         values = parse_toml(read_text(path, MAX_CONFIG_BYTES))
@@ -35,6 +37,11 @@ def read_config(path: Path) -> Values:
     for name, table in values.items():
         if name not in SECTIONS or not isinstance(table, dict):
             raise UsageError(f"{path}: [{name}] is none of the tables {', '.join(SECTIONS)}")
+        known = [setting.key for setting in all_settings() if setting.section == name]
+        for key in table:
+            if key not in known:
+                near = ", ".join(get_close_matches(key, known, 1) or known)
+                raise UsageError(f"{path}: {name}.{key}: no such setting; there is {near}")
     return values
 
 

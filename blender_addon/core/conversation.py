@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from generator.errors import HeadturnError
+from generator.errors import HeadturnError, UsageError
 
+from .progress import Progress
 from .state import State
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Conversation:
 
     state: gets what went wrong, and the host that was found. start: starts the server on that host;
     raises HeadturnError. on_change: something that the panel shows is different. on_due: from now on poll is
-    to be called until it says that nothing is due.
+    to be called until it says that nothing is due. progress: how far the answer is that is due.
     """
 
     def __init__(
@@ -77,9 +78,11 @@ class Conversation:
         self.state = state
         self._start, self._on_change, self._on_due = start, on_change, on_due
         self._server: Server | None = None
+        self.progress = Progress()
         self._waiting: deque[Question] = deque()
         self._later: deque[Question] = deque()
         self._found: deque[Callable[[], None]] = deque()
+        self._file = 0  # how often another file was opened; what was asked for an earlier one is nobody's
         self._looked = 0  # how often the host was looked for anew; what an earlier look finds is late
 
     def request(self, message: dict[str, Any], busy: str, on_answer: OnAnswer, look: Look) -> None:
@@ -88,7 +91,13 @@ class Conversation:
         A reason why it cannot is shown in the panel.
         """
         self.state.error = ""
-        self.with_host(lambda: self._ask(Question(message, on_answer, self.fail, busy)), look)
+        file = self._file
+
+        def ask() -> None:
+            if file == self._file:
+                self._ask(Question(message, on_answer, self.fail, busy))
+
+        self.with_host(ask, look)
 
     def ask_later(self, questions: Iterable[Question]) -> None:
         """What to ask, one by one, while nothing else is asked; in place of what was to be asked before."""
@@ -127,6 +136,14 @@ class Conversation:
         threading.Thread(target=find, daemon=True).start()
         self._on_due()
 
+    def find_now(self, look: Look) -> None:
+        """Find the host and wait for it. Raises HeadturnError."""
+        if self.state.facts is None:
+            host, facts = look()
+            if facts.problem:
+                raise UsageError(facts.problem)
+            self.state.host, self.state.facts = host, facts
+
     def poll(self) -> bool:
         """Take in what came, ask what is next. True while something is due."""
         while self._found:
@@ -154,6 +171,8 @@ class Conversation:
         """What is going on, for the panel; empty if nobody needs to know."""
         if self.state.checking:
             return "looking for Headturn..."
+        if self.progress.total:
+            return self.progress.line()
         return next((question.busy for question in self._waiting if question.busy), "")
 
     def forget_host(self) -> None:
@@ -162,6 +181,21 @@ class Conversation:
         self._looked += 1
         self.state.checking = False
         self.state.host, self.state.facts, self.state.host_error = None, None, ""
+
+    def drop(self) -> None:
+        """Nobody waits for answers any more: another file is opened, or somebody has had enough.
+
+        A host that is busy with one is ended meanwhile; the next question starts another. A look for the
+        host goes on: a build may be waiting for it.
+        """
+        self._file += 1
+        self._later.clear()
+        if self._waiting and self._server is not None:
+            threading.Thread(target=self._server.close, daemon=True).start()
+            self._server = None
+        self._waiting.clear()
+        self.progress = Progress()
+        self._on_change()
 
     def close(self) -> None:
         """End the preview server; nothing that was asked will be answered."""
@@ -186,6 +220,11 @@ class Conversation:
         for answer in server.poll():
             if not self._waiting:  # an answer led to the end of the conversation
                 return
+            if "event" in answer:
+                self.progress.take(answer)
+                self._on_change()
+                continue
+            self.progress = Progress()
             question = self._waiting.popleft()
             if "error" in answer:
                 question.on_error(answer["error"])
@@ -199,6 +238,7 @@ class Conversation:
             self._end_server()
 
     def _end_server(self) -> None:
+        self.progress = Progress()
         if self._server is not None:
             self._server.close()
             self._server = None

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, get_args
 from generator.plan.setting import Setting
 
 from .config import same
+from .units import DEGREES, angle_of
 from .words import HELP, titled
 
 Get = Callable[[str], Any]
@@ -35,6 +36,11 @@ class Field:
         return f"{self.setting.section}_{self.setting.key}"
 
     @property
+    def drawn(self) -> str:
+        """The property that is drawn."""
+        return angle_of(self.name) if self.is_angle else self.name
+
+    @property
     def style(self) -> str:
         """How rows.py draws it."""
         return "plain"
@@ -45,6 +51,11 @@ class Field:
         unit = f" ({self.setting.info.unit})" if self.setting.info.unit else ""
         help = HELP.get(self.setting.name, self.setting.info.help)
         return {"name": titled(self.setting.info.label), "description": f"{help}{unit}"}
+
+    @property
+    def is_angle(self) -> bool:
+        """Is it shown by a second property, in radians? See units.py."""
+        return self.setting.info.unit == DEGREES
 
     @property
     def optional(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .state import HeadName
+from .found import HeadName
 
 AROUND = 50
 """How many heads before and after the shown one have their picture made: a source may hold thousands."""

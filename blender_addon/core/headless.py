@@ -14,14 +14,14 @@ from generator.errors import HeadturnError
 from generator.escape import printable
 from generator.interpreter import python_environment
 
-from .host import check_host, find_host, host_command
+from .host import HostMissing, check_host, find_host, host_command, install_commands
 from .process import HostProcess
-from .progress import Progress
-
-LINE_EVERY_S = 5.0
+from .progress import Progress, Told
 
 
-def run(arguments: Sequence[str], *, preference: str = "", blender: str = "") -> int:
+def run(
+    arguments: Sequence[str], *, preference: str = "", blender: str = "", set_up: Path | None = None
+) -> int:
     """Carry out one headturn command on the host and return its exit code.
 
     Progress of a build is printed to stdout a line at a time, for logs of a
@@ -31,11 +31,15 @@ def run(arguments: Sequence[str], *, preference: str = "", blender: str = "") ->
     try:
         configuration = next((Path(a) for a in arguments if a.endswith(".toml")), None)
         beside = configuration.absolute().parent if configuration else Path.cwd()
-        host = find_host(preference, beside)
+        host = find_host(preference, beside, set_up=set_up)
         command = host_command(host, check_host(host), arguments, blender)
         if arguments[0] == "build" and not {"--json", "--help"} & set(arguments):
             return _build(command)
         return _pass_through(command)
+    except HostMissing as error:
+        lines = [f"headturn: {error}", "or make an environment by hand:", *install_commands()]
+        print("\n  ".join(map(printable, lines)), file=sys.stderr, flush=True)
+        return error.exit_code
     except HeadturnError as error:
         print(printable(f"headturn: {error}"), file=sys.stderr, flush=True)
         return error.exit_code
@@ -54,19 +58,14 @@ def _pass_through(command: list[str]) -> int:
 def _build(command: list[str]) -> int:
     process = HostProcess([*command, "--json"])
     previous = signal.signal(signal.SIGTERM, lambda *_: process.interrupt())
-    progress, printed, last = Progress(), 0, ("", 0.0)
+    progress, told = Progress(), Told()
     try:
         while (code := process.exit_code) is None:
             try:
                 for event in process.poll():
                     progress.take(event)
-                while printed < len(progress.notes):
-                    print(printable(progress.notes[printed]), flush=True)
-                    printed += 1
-                now = time.monotonic()
-                if progress.total and (progress.stage != last[0] or now - last[1] >= LINE_EVERY_S):
-                    print(printable(progress.line()), flush=True)
-                    last = (progress.stage, now)
+                for line in told.new(progress):
+                    print(printable(line), flush=True)
                 time.sleep(0.05)
             except KeyboardInterrupt:
                 process.interrupt()

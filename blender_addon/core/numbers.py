@@ -10,6 +10,7 @@ from generator.plan.setting import Setting
 
 from .config import number
 from .field import Field, Get, Property
+from .units import OPTIONS
 from .words import LIMITS, UNSET, WHERE_NOT_GIVEN, Unset
 
 
@@ -91,11 +92,12 @@ def _scale(setting: Setting, whole: bool = False) -> dict[str, Any]:
         low = info.above + (1 if whole else max(1e-6, abs(info.above) * 1e-6))
     ends = {"min": low, "max": high}
     limits = {key: _whole_limit(end) if whole else end for key, end in ends.items() if end is not None}
+    shown = {**limits, **OPTIONS.get(info.unit, {})}
     if whole:
-        return limits
+        return shown
     if low is not None and 0 <= low < 1e-3 and high == 1:
-        return {**limits, "subtype": "FACTOR"}
-    return {**limits, **({"precision": 1, "step": 100} if info.unit in ("mm", "degrees") else {"step": 1})}
+        return {**shown, "subtype": "FACTOR"}
+    return {**shown, **({"precision": 1, "step": 100} if info.unit in ("mm", "degrees") else {"step": 1})}
 
 
 def _whole_limit(end: float) -> int:

@@ -4,25 +4,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import fields as fields_of
 from typing import NamedTuple
 
 from generator.errors import HeadturnError
+from generator.plan.render_settings import Sensor
 from generator.plan.settings import SECTIONS, Values
+from generator.plan.shading import Shading
+from generator.plan.wear import Wear
 
 from .build import Build
 from .conversation import Conversation
 from .field import Field
 from .fields import fields
-from .state import HeadName, State
-from .tables import applies, is_drawn, section_of
+from .found import HeadName, Listing, Placed, Points
+from .looks import Look
+from .tables import applies, is_drawn, is_gridded, section_of
+from .words import LIMITS
 
 SKIPPED_SHOWN = 3
 
-SELECTION = (
-    *("heads.subjects", "heads.expressions"),
-    *("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
-)
-"""Settings in a panel of their own, which is closed at first."""
+SELECTION, SENSOR, LAMPS, WORN = "Selection", "Sensor", "Lamps and Skin", "Worn"
+"""Panels below those of their sections, which are closed at first."""
+
+_BELOW = {
+    **dict.fromkeys(
+        (
+            *("heads.subjects", "heads.expressions", "heads.license", "heads.redistributable"),
+            *("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
+        ),
+        SELECTION,
+    ),
+    **{
+        f"render.{one.name}": place
+        for place, those in ((SENSOR, Sensor), (LAMPS, Shading), (WORN, Wear))
+        for one in fields_of(those)
+    },
+}
+"""Setting -> the panel below that it stands in. All others stand in the panel of their section."""
+
+COLUMNS = ("From", "To", "Step")
+"""Above the ranges of angles."""
 
 OWN_PANEL = ("heads", "poses", "render")
 """Sections with a panel of their own; those of all others stand beside the Build button."""
@@ -37,24 +59,29 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """A setting in the panel. parts: how many of its numbers are shown; 0 for all."""
+    """A setting in the panel. parts: how many of its numbers stand in columns; 0 where there are none.
+
+    header: over its columns; () below a row that has it.
+    """
 
     field: Field
     parts: int = 0
+    header: tuple[str, ...] = ()
 
 
-def rows(sections: tuple[str, ...], values: Values, *, selection: bool | None = None) -> list[Row]:
+def rows(sections: tuple[str, ...], values: Values, below: str = "") -> list[Row]:
     """The rows of some sections, in the table's order: the settings that mean something beside these values.
 
-    selection: those of the panel Selection alone, or those that are not in it; None for both.
+    below: those of this panel below theirs; without it, those of none.
     """
-    return [
-        Row(field, parts=_parts(field, values))
-        for field in fields()
-        if field.setting.section in sections
-        and applies(field, values)
-        and (selection is None or (field.setting.name in SELECTION) is selection)
-    ]
+    found: list[Row] = []
+    for field in fields():
+        setting = field.setting
+        if setting.section in sections and applies(field, values) and _BELOW.get(setting.name, "") == below:
+            parts = _parts(field, values)
+            begins = parts and not (found and found[-1].parts == parts)
+            found.append(Row(field, parts, COLUMNS[:parts] if begins else ()))
+    return found
 
 
 def other_sections() -> tuple[str, ...]:
@@ -69,45 +96,49 @@ def going_on(conversation: Conversation) -> Line | None:
     return Line(conversation.busy, "SORTTIME") if conversation.busy else None
 
 
-def found(state: State) -> Line:
+def found(listing: Listing) -> Line:
     """How many heads there are."""
-    return Line(f"{len(state.heads)} heads of {len(state.subjects())} subjects", "INFO")
+    return Line(f"{len(listing.heads)} heads of {len(listing.subjects())} subjects", "INFO")
 
 
-def in_view(state: State, chosen: HeadName) -> list[Line]:
-    """Of the head in view: its vertices and what is to be said of it, or its name if another is chosen."""
-    if state.displayed is None:
+def in_view(placed: Placed | None, chosen: HeadName, source: str) -> list[Line]:
+    """Of the head in view: its vertices and what is to be said of it, or its name if another is chosen.
+
+    source: the key of the one that is named; the head in view may be of another.
+    """
+    if placed is None:
         return []
-    if state.displayed != chosen:
-        return [Line(f"in view: {' '.join(state.displayed)}", "NONE")]
-    return [Line(f"{state.vertices:,} vertices", "NONE"), *(Line(note, "DOT") for note in state.notes)]
+    name = " ".join(placed.head)
+    if placed.source != source:
+        return [Line(f"in view: {name}, of other heads than those named above; load them", "INFO")]
+    if placed.head != chosen:
+        return [Line(f"in view: {name}", "NONE")]
+    return [Line(f"{placed.vertices:,} vertices", "NONE"), *(Line(note, "DOT") for note in placed.notes)]
 
 
-def left_out(state: State) -> list[Line]:
+def left_out(listing: Listing) -> list[Line]:
     """Heads that cannot be shown, and why: the first few."""
-    lines = [Line(f"left out: {reason}", "ERROR") for reason in state.skipped[:SKIPPED_SHOWN]]
-    if (more := len(state.skipped) - SKIPPED_SHOWN) > 0:
+    lines = [Line(f"left out: {reason}", "ERROR") for reason in listing.skipped[:SKIPPED_SHOWN]]
+    if (more := len(listing.skipped) - SKIPPED_SHOWN) > 0:
         lines.append(Line(f"and {more} more left out", "BLANK1"))
     return lines
 
 
-def landmarks(state: State) -> Line | None:
+def landmarks(found: Points | None) -> Line | None:
     """Was a face found at this pose? None if nobody has looked yet."""
-    if state.landmarks is None:
+    if found is None:
         return None
-    if state.landmarks[1] is None:
+    if found.points is None:
         return Line("no face was found at this pose", "ERROR")
-    return Line(f"{len(state.landmarks[1])} landmarks found", "CHECKMARK")
+    return Line(f"{len(found.points)} landmarks found", "CHECKMARK")
 
 
-def look(state: State, head: HeadName, pose: tuple[float, ...]) -> Line | None:
-    """Which look the picture shows, and whether it is that of the head and pose in view."""
-    if state.look is None:
-        return None
-    if (state.look.head, state.look.pose) == (head, pose):
-        return Line(f"seed {state.look.seed}", "CHECKMARK")
-    of = ", ".join(f"{angle:g}" for angle in state.look.pose)
-    return Line(f"seed {state.look.seed}, {state.look.head[0]} at {of}: show it again for this pose", "INFO")
+def look(shown: Look, pose: tuple[float, ...]) -> Line:
+    """Which look the picture shows, and whether it is that of the pose in view."""
+    if shown.pose == pose:
+        return Line(f"seed {shown.seed}", "CHECKMARK")
+    of = ", ".join(f"{angle:g}" for angle in shown.pose)
+    return Line(f"seed {shown.seed}, {shown.head[0]} at {of}: show it again for this pose", "INFO")
 
 
 def pose_count(values: Values) -> Line:
@@ -124,14 +155,21 @@ def pose_count(values: Values) -> Line:
     return Line(f"{count:,} poses a head", "INFO")
 
 
-def outcome(build: Build, state: State) -> Line | None:
+def snap(values: Values) -> Line | None:
+    """What snapping needs where it does nothing."""
+    if is_gridded(values):
+        return None
+    return Line("Snap needs Dataset Poses: Grid", "INFO")
+
+
+def outcome(build: Build) -> Line | None:
     """How far a build is, how it ended, or why it did not start."""
     if build.runs or build.exit_code is not None:
         return Line(build.headline(), "INFO" if build.runs or build.exit_code == 0 else "ERROR")
-    return Line(state.error, "ERROR") if build.refused and state.error else None
+    return Line(build.refused, "ERROR") if build.refused else None
 
 
 def _parts(field: Field, values: Values) -> int:
     """Random poses have ranges without a step."""
-    ranged = field.setting.section == "poses" and field.style == "numbers"
-    return 2 if ranged and is_drawn(values) else 0
+    ranged = field.setting.name in LIMITS
+    return (2 if is_drawn(values) else 3) if ranged else 0

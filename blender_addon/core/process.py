@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
-import signal
 import subprocess
 import threading
 from collections import deque
@@ -16,6 +14,7 @@ from typing import IO, Any
 
 from generator.errors import WorkerError
 from generator.interpreter import python_environment
+from generator.platforms import HERE
 from generator.reading import parse_json
 
 _LOG_LINES = 40
@@ -29,7 +28,6 @@ class HostProcess:
     """
 
     def __init__(self, command: Sequence[str]) -> None:
-        flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
         try:
             self._process = subprocess.Popen(
                 command,
@@ -40,8 +38,7 @@ class HostProcess:
                 text=True,
                 encoding="utf-8",
                 errors="replace",
-                creationflags=flags,
-                start_new_session=not flags,
+                **HERE.own_group(),
             )
         except OSError as error:
             raise WorkerError(f"cannot start {command[0]}: {error.strerror}") from error
@@ -97,13 +94,9 @@ class HostProcess:
         return self.log[-1] if self.log else "it printed nothing"
 
     def interrupt(self) -> None:
-        """Ask it to end in order.
-
-        Not by SIGINT: programs started in the background, and what they start, ignore that.
-        """
+        """Ask it to end in order."""
         if self._process.poll() is None:
-            name = "CTRL_BREAK_EVENT" if os.name == "nt" else "SIGTERM"
-            self._process.send_signal(getattr(signal, name))
+            HERE.interrupt(self._process)
 
     def close(self, timeout: float = 5.0) -> None:
         """Interrupt it, wait for its end, kill it if it does not come, close the pipes."""

@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import Any
+
+LINE_EVERY_S = 5.0
+RENDERING = "rendering"
 
 EXIT_MEANING = {
     0: "done",
@@ -13,18 +17,24 @@ EXIT_MEANING = {
     3: "finished, but something was left out",
     130: "stopped",
     143: "stopped",
+    149: "stopped",
 }
 
 
 @dataclass
 class Progress:
-    """The state of one build. Feed it the events of ``headturn build --json``."""
+    """The state of one build. Feed it the events of ``headturn build --json``.
+
+    rate: steps of the stage a second. rendered: images, and render_rate: how many a second.
+    """
 
     stage: str = "starting"
     done: int = 0
     total: int = 0
     rate: float = 0.0
     eta_s: float = 0.0
+    rendered: int = 0
+    render_rate: float = 0.0
     notes: list[str] = field(default_factory=list)
     result: dict[str, Any] | None = None
 
@@ -37,6 +47,8 @@ class Progress:
             case "progress":
                 self.stage, self.done, self.total = event["stage"], event["done"], event["total"]
                 self.rate, self.eta_s = event["rate"], event["eta_s"]
+                if self.stage == RENDERING:
+                    self.rendered, self.render_rate = self.done, self.rate
             case "note":
                 self.notes.append(event["text"])
             case "finished":
@@ -57,6 +69,25 @@ class Progress:
         if self.rate and self.done < self.total:
             text += f" · {self.rate:.1f}/s · {duration(self.eta_s)} left"
         return text
+
+
+@dataclass
+class Told:
+    """What was already said of a progress, for those who read lines."""
+
+    _notes: int = 0
+    _stage: str = ""
+    _at: float = 0.0
+
+    def new(self, progress: Progress) -> list[str]:
+        """Notes, and how far it is: at the start of a stage, and every few seconds."""
+        lines = progress.notes[self._notes :]
+        self._notes += len(lines)
+        now = time.monotonic()
+        if progress.total and (progress.stage != self._stage or now - self._at >= LINE_EVERY_S):
+            self._stage, self._at = progress.stage, now
+            lines.append(progress.line())
+        return lines
 
 
 def duration(seconds: float) -> str:

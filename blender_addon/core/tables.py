@@ -47,6 +47,11 @@ def _kind(values: Values) -> str:
     return str(_told(values, "poses", "kind", GRID))
 
 
+def is_gridded(values: Values) -> bool:
+    """Are the poses those of a grid?"""
+    return _kind(values) == GRID
+
+
 def is_drawn(values: Values) -> bool:
     """Are the poses random?"""
     return _kind(values) not in (GRID, TABLE)
@@ -55,7 +60,10 @@ def is_drawn(values: Values) -> bool:
 _APPLIES: dict[str, Callable[[Values], bool]] = {
     **dict.fromkeys(("heads.count", "heads.seed", "heads.sampled_expressions"), _made),
     **dict.fromkeys(
-        ("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
+        (
+            *("heads.units", "heads.eye_distance_mm", "heads.up", "heads.forward"),
+            *("heads.license", "heads.redistributable"),
+        ),
         lambda values: not _made(values),
     ),
     **dict.fromkeys(("poses.yaw", "poses.pitch", "poses.roll"), lambda values: _kind(values) != TABLE),
@@ -67,7 +75,7 @@ _APPLIES: dict[str, Callable[[Values], bool]] = {
 
 def applies(field: Field, values: Values) -> bool:
     """Does a setting mean anything beside these values?"""
-    return _APPLIES.get(field.setting.name, lambda values: True)(values)
+    return field.setting.name not in _APPLIES or _APPLIES[field.setting.name](values)
 
 
 def configuration(get: Get, told: Values) -> Values:
@@ -91,12 +99,15 @@ def configuration(get: Get, told: Values) -> Values:
 
 
 def properties_of(config: Values) -> dict[str, Any]:
-    """The properties that say what a file told. TypeError if they cannot."""
+    """The properties that say what a file told. ValueError, which names the setting, if they cannot."""
     found: dict[str, Any] = {}
     for field in fields():
         value = config.get(field.setting.section, {}).get(field.setting.key)
         if value is not None:
-            found |= field.properties_of(value)
+            try:
+                found |= field.properties_of(value)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{field.setting.name}: the panel cannot show {value!r}") from error
     return found
 
 

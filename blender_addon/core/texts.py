@@ -11,7 +11,7 @@ from generator.plan.setting import Setting
 
 from .config import join_names, same, split_names
 from .field import Field, Get, Property
-from .words import GUESSED, HELP, LABELS, titled
+from .words import GUESSED, HELP, LABELS, NOT_GIVEN, titled
 
 GUESS = "GUESS"
 """The item of a choice that is not given."""
@@ -19,8 +19,13 @@ GUESS = "GUESS"
 FOLDER = "FOLDER"
 """The item of heads that lie on the disk."""
 
-EXPANDED = 3
-"""So many choices stand side by side; more are a menu."""
+MESHES = (
+    *(".obj", ".ply", ".glb", ".gltf", ".vrm", ".fbx", ".dae", ".usd", ".usda", ".usdc", ".usdz", ".stl"),
+)
+"""Endings of files that hold a head."""
+
+EXPANDED, ABREAST = 3, 26
+"""So many choices stand side by side, if their names have no more letters; others are a menu."""
 
 
 class Switch(Field):
@@ -74,11 +79,14 @@ class Choice(Field):
 
     @property
     def style(self) -> str:
-        return "expanded" if len(self._items) <= EXPANDED else "menu"
+        if self.kind is bool:
+            return "menu"  # Yes and No say nothing without their name
+        letters = sum(len(name) for _, name, _ in self._items)
+        return "expanded" if len(self._items) <= EXPANDED and letters <= ABREAST else "menu"
 
     @property
     def _items(self) -> tuple[tuple[str, str, str], ...]:
-        guess = ((GUESS, *GUESSED),) if self.optional else ()
+        guess = ((GUESS, *NOT_GIVEN.get(self.setting.name, GUESSED)),) if self.optional else ()
         if self.kind is bool:
             return (*guess, ("YES", "Yes", ""), ("NO", "No", ""))
         return (*guess, *_items(self.setting))
@@ -175,4 +183,5 @@ def asks_for_folder(choice: str) -> bool:
 
 
 def _items(setting: Setting) -> tuple[tuple[str, str, str], ...]:
-    return tuple((choice.value, titled(choice.name), choice.help) for choice in setting.choices)
+    named = [LABELS.get(f"{setting.name}:{choice.value}", titled(choice.name)) for choice in setting.choices]
+    return tuple((one.value, name, one.help) for one, name in zip(setting.choices, named, strict=True))

@@ -27,12 +27,17 @@ UNSET = {
 GUESSED = ("Guess", "Found when the heads are read")
 """Name and tooltip of a choice that is not given."""
 
+NOT_GIVEN = {
+    "heads.redistributable": ("As They Say", "As the heads' own cards say; not, where they do not say")
+}
+"""The same by setting, where it is not guessed."""
+
 LIMITS = {"poses.yaw": 89.9, "poses.pitch": 180.0, "poses.roll": 180.0}
 """Degrees to either side; generator.plan.poses refuses what is beyond."""
 
 _RANGE = "From, to and step. Random plans use from and to"
 
-LABELS = {"heads.source:ict": "ICT-FaceKit"}
+LABELS = {"heads.source:ict": "ICT-FaceKit", "dataset.passes:uv": "UV"}
 """Of choices whose name is no word."""
 
 HELP = {
@@ -43,11 +48,13 @@ HELP = {
     "heads.seed": "The same seed makes the same heads",
     "heads.subjects": "Only these, separated by commas. Empty: all of them",
     "heads.expressions": "Only these, separated by commas, such as neutral, smile. Empty: all of them",
+    "heads.license": "Of heads that do not say, such as CC-BY-4.0. Empty: as they say",
     "poses.kind": "How the poses are chosen",
     "poses.yaw": _RANGE,
     "poses.pitch": _RANGE,
     "poses.roll": _RANGE,
     "poses.seed": "Of random poses",
+    "dataset.passes": "Further images of each view, in OpenEXR: what each pixel shows",
     "render.background": "Colour behind the head",
 }
 """Tooltips by setting, where the command line's help speaks of its options or of how a value is written."""

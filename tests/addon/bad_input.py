@@ -19,6 +19,7 @@ import bpy
 EXTENSION = "bl_ext.user_default.headturn"
 session = import_module(f"{EXTENSION}.session")
 building = import_module(f"{EXTENSION}.building")
+keys = import_module(f"{EXTENSION}.keys")
 pictures = import_module(f"{EXTENSION}.pictures")
 
 
@@ -45,8 +46,7 @@ def build(out: Path) -> str:
     """Press Build; what the panel then says."""
     scene = bpy.context.scene
     scene.headturn.out = str(out)
-    building.forget()
-    session.with_host(lambda: building.start(scene))
+    building.begin(scene.headturn)
     until(lambda: building.current.exit_code is not None)
     return building.current.headline()
 
@@ -60,7 +60,7 @@ def main(folder: Path) -> None:
     before = kept_pictures()
     python = os.environ.pop("HEADTURN_PYTHON")
     said = load(folder / "facescape")
-    assert "pip install 'headturn[build]'" in said, said
+    assert "press Set Up" in said, said
     os.environ["HEADTURN_PYTHON"] = python
 
     said = load(folder / "models-missing")
@@ -72,12 +72,14 @@ def main(folder: Path) -> None:
     assert load(folder / "facescape") == ""
     shown = bpy.context.scene.headturn
     state = session.state
-    assert [reason.split(" is missing")[0] for reason in state.skipped] == [
+    assert [reason.split(" is missing")[0] for reason in keys.listing(shown).skipped] == [
         "facescape-2/neutral: the texture '1_neutral.jpg'"
     ]
-    assert state.displayed == ("facescape-1", "neutral") and len(shown.head.data.vertices) > 1000
-    until(lambda: all(pictures.kept(f"head/{a}/{b}") for a, b in state.heads))
-    assert len(state.heads) == 2
+    shown = bpy.context.scene.headturn
+    assert keys.viewed(shown) == ("facescape-1", "neutral") and len(shown.head.data.vertices) > 1000
+    source, key_of = keys.placed(shown).source, import_module(f"{EXTENSION}.gallery").key_of
+    until(lambda: all(pictures.kept(key_of(source, head)) for head in keys.listing(shown).heads))
+    assert len(keys.listing(shown).heads) == 2
     assert len(kept_pictures() - before) == 1, "subjects 1 and 3 are the same files: one picture serves both"
 
     # Random poses come from the host, and each head has its own.
@@ -94,7 +96,7 @@ def main(folder: Path) -> None:
             assert shown.yaw != poses[-1][0]
             bpy.ops.headturn.step_head(what="SUBJECT", by=by)
             until(lambda: not session.conversation.is_busy)
-            until(lambda: state.displayed == (shown.subject, shown.expression))
+            until(lambda: keys.viewed(shown) == (shown.subject, shown.expression))
         scene.frame_set(5)
         assert len(set(poses)) == 2 and (shown.yaw, shown.pitch, shown.roll) == poses[0], poses
         shown.poses_same = True
@@ -115,10 +117,10 @@ def main(folder: Path) -> None:
     bpy.ops.headturn.step_head(what="SUBJECT", by=1)
     until(lambda: not session.conversation.is_busy)
     assert str(folder / "facescape") in state.error, state.error
-    assert state.displayed == ("facescape-1", "neutral") and len(shown.head.data.vertices) == vertices
+    assert keys.viewed(shown) == ("facescape-1", "neutral") and len(shown.head.data.vertices) == vertices
     said = build(folder / "never")
     assert building.current.exit_code == 2 and "no such file or folder" in said, said
-    report = bpy.data.texts["Headturn report"].as_string()
+    report = building.report().as_string()
     assert report.splitlines()[1].startswith("wrong use (exit code 2): no such file"), report
 
     # Another Blender builds into that folder.

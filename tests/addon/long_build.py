@@ -19,7 +19,7 @@ build = building.current
 shown = bpy.context.scene.headturn
 shown.heads_count, shown.render_resolution, shown.workers, shown.out = 1, 64, 1, str(out)
 shown.poses_yaw = shown.poses_pitch = (-40, 40, 1)
-session.with_host(lambda: building.start(bpy.context.scene))
+building.begin(shown)
 FIRST_PART = 100
 """Images of a part: when there are more, it was committed."""
 

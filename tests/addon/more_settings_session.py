@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 
 NAME = "bl_ext.user_default.headturn"
+LAYOUTS = ("row", "column", "box", "split", "grid_flow")
 
 
 class Drawn:
@@ -26,7 +27,7 @@ class Drawn:
         self.names.append(name)
 
     def __getattr__(self, kind: str) -> Any:
-        return lambda *_, **__: self if kind in ("row", "column", "box") else SimpleNamespace()
+        return lambda *_, **__: self if kind in LAYOUTS else SimpleNamespace()
 
 
 def drawn_by(panel: str) -> list[str]:
@@ -43,8 +44,9 @@ def drawn_by(panel: str) -> list[str]:
 def main(package: str, folder: str) -> None:
     bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
     settings = importlib.import_module(f"{NAME}.settings")
-    rows = importlib.import_module(f"{NAME}.panel")
-    rows.message = lambda *_, **__: None  # there is no region whose width lines are wrapped to
+    for name in ("panel", "build_lines", "waiting", "setting_up"):
+        rows = importlib.import_module(f"{NAME}.{name}")
+        rows.message = lambda *_, **__: None  # there is no region whose width lines are wrapped to
     shown = bpy.context.scene.headturn
 
     found = shown.bl_rna.properties["render_exposure"]
@@ -62,7 +64,7 @@ def main(package: str, folder: str) -> None:
     assert "render_background" in names and names[-2:] == ["render_exposure", "render_tint"], names
     names = drawn_by("PosesPanel")
     assert names.index("poses_frame") + 1 == names.index("poses_jitter_unset"), names
-    assert {"dataset_notes", "dataset_logo"} < set(drawn_by("BuildPanel"))
+    assert {"dataset_notes", "dataset_logo"} < set(drawn_by("OutputPanel"))
 
     plan = importlib.import_module(f"{NAME}.generator.plan.view_plan")
     planned = settings.planned(shown)

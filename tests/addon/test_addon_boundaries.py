@@ -17,7 +17,7 @@ FILES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
     for path in sorted(ADDON.rglob("*.py"))
 }
-BLENDERS = {"bpy", "mathutils", "bpy_extras", "gpu", "gpu_extras"}
+BLENDERS = {"bpy", "bl_operators", "mathutils", "bpy_extras", "gpu", "gpu_extras"}
 STARTED = {"numpy", "generator.blender", "generator.heads", "generator.geometry", "generator.plan.poses"}
 """What Blender's start must not wait for."""
 

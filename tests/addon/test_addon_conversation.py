@@ -12,10 +12,11 @@ from typing import Any
 import pytest
 
 from blender_addon.core.conversation import Conversation, Question
+from blender_addon.core.found import Found, Listing, extremes
 from blender_addon.core.host import Host, HostFacts, HostMissing
 from blender_addon.core.process import HostProcess
 from blender_addon.core.state import State
-from generator.errors import WorkerError
+from generator.errors import UsageError, WorkerError
 
 HOST = Host(("headturn",), "PATH")
 FACTS = HostFacts("1", "3.11", "4.5", "0.10", "21", None)
@@ -244,28 +245,92 @@ def test_a_real_process() -> None:
 
 @pytest.mark.parametrize("what", ["SUBJECT", "EXPRESSION"])
 def test_stepping_goes_around_the_end(what: str) -> None:
-    state = State(heads=[("anna", "smile"), ("anna", "neutral"), ("bert", "smile")])
-    assert state.subjects() == ["anna", "bert"] and state.expressions("anna") == ["smile", "neutral"]
-    assert state.first_of("anna") == "neutral" and state.first_of("bert") == "smile"
+    listing = Listing([("anna", "smile"), ("anna", "neutral"), ("bert", "smile")])
+    assert listing.subjects() == ["anna", "bert"] and listing.expressions("anna") == ["smile", "neutral"]
+    assert listing.first_of("anna") == "neutral" and listing.first_of("bert") == "smile"
     expected = {"SUBJECT": ("bert", "smile"), "EXPRESSION": ("anna", "neutral")}[what]
-    assert state.beside(("anna", "smile"), what, 1) == state.beside(("anna", "smile"), what, -1) == expected
-    assert state.beside(("gone", "smile"), "SUBJECT", 1) == ("anna", "neutral")
+    beside = [listing.beside(("anna", "smile"), what, by) for by in (1, -1)]
+    assert beside == [expected, expected]
+    assert listing.beside(("gone", "smile"), "SUBJECT", 1) == ("anna", "neutral")
 
 
-def test_answers_change_what_is_known() -> None:
-    state = State(displayed=("old", "neutral"), error="")
+def test_a_list_says_why_there_is_nothing() -> None:
     listed = [{"subject": "a", "expression": "neutral", "problems": []}]
-    state.take_list({"kind": "mesh", "heads": listed, "skipped": ["b/neutral: no texture"]})
-    assert state.heads == [("a", "neutral")] and state.displayed is None and state.error == ""
-    state.take_head(("a", "neutral"), {"notes": ["units guessed"], "vertices": 9, "radius_mm": 1.0})
-    assert (state.displayed, state.vertices, state.notes) == (("a", "neutral"), 9, ["units guessed"])
-    state.take_extremes([[[0, 0]], None, [[1, 1]]])
-    assert state.extremes == "A face was found in 2 of 3"
-    state.forget_heads()
-    assert not state.heads and not state.skipped and state.displayed == ("a", "neutral")
-    state.take_list({"kind": "mesh", "heads": [], "skipped": ["b/neutral: no texture"]})
-    assert state.error == "b/neutral: no texture"
-    state.take_list({"kind": "mesh", "heads": [], "skipped": []})
-    assert state.error == "this source holds no heads"
+    listing = Listing.of({"kind": "mesh", "heads": listed, "skipped": ["b/neutral: no texture"]})
+    assert listing == Listing([("a", "neutral")], ["b/neutral: no texture"]) and listing.problem == ""
+    assert Listing([], ["b/neutral: no texture"]).problem == "b/neutral: no texture"
+    assert Listing().problem == "this source holds no heads"
+    assert extremes([[[0, 0]], None, [[1, 1]]]) == "A face was found in 2 of 3"
+
+
+def test_progress_is_shown_until_the_answer_comes() -> None:
+    talk = Talk()
+    talk.state.facts = FACTS
+    talk.ask("list")
+    told = {"stage": "making heads", "total": 20}
+    assert talk.answer(event="stage", **told) and talk.conversation.busy == "making heads 0 of 20"
+    assert talk.answer(event="progress", done=5, rate=2.0, eta_s=7.5, **told)
+    assert talk.conversation.busy == "making heads 5 of 20 · 2.0/s · 0:08 left"
+    assert talk.conversation.progress.share == 0.25 and not talk.got
+    assert not talk.answer(heads=3) and talk.got == [{"heads": 3}] and talk.conversation.progress.total == 0
+
+
+def test_nobody_waits_once_another_file_is_open() -> None:
+    talk = Talk()
+    talk.state.facts = FACTS
+    talk.ask("list")
+    talk.conversation.ask_later([Question({"op": "thumbnail"}, talk.got.append, talk.got.append)])
+    busy = talk.servers[0]
+    busy.answers = [{"heads": 3}]
+    talk.conversation.drop()
+    assert not talk.conversation.poll() and not talk.got and not talk.conversation.is_busy
+    talk.poll_until(lambda: busy.closed)
+    talk.ask("list")
+    assert len(talk.servers) == 2 and not talk.answer(heads=4) and talk.got == [{"heads": 4}]
+    # A server that nobody waits for goes on.
+    talk.conversation.drop()
+    talk.ask("place")
+    assert len(talk.servers) == 2
+
+
+def test_what_waits_for_the_host_is_not_asked_for_another_file() -> None:
+    talk = Talk()
+    talk.went_on.clear()
+    built: list[str] = []
+    talk.ask("list")
+    talk.conversation.with_host(lambda: built.append("a build outlives the file"), talk.look)
+    talk.conversation.drop()
+    talk.went_on.set()
+    talk.poll_until(lambda: built)
+    assert not talk.servers and not talk.conversation.is_busy
+
+
+def test_the_host_can_be_waited_for() -> None:
+    talk = Talk()
+    talk.conversation.find_now(talk.look)
+    talk.conversation.find_now(talk.look)
+    assert talk.looks == 1 and talk.state.facts == FACTS
+    lacking = Talk(HostFacts("1", "3.11", None, None, "21", None))
+    with pytest.raises(UsageError, match="mediapipe missing"):
+        lacking.conversation.find_now(lacking.look)
+
+
+def test_a_list_goes_with_the_file() -> None:
+    listing = Listing([("anna", "neutral"), ("Lee, Perry", "smile")], ["b/neutral: no texture"])
+    text = listing.text("source")
+    assert Listing.read(text, "source") == listing
+    assert Listing.read(text, "another") is None and Listing.read("", "source") is None
+
+
+def test_what_was_found_counts_for_its_key() -> None:
+    found: Found[str] = Found(kept=2)
+    assert found.of("a") is None
+    for key in ("a", "b", "a", "c"):
+        found.take(key, f"of {key}")
+    assert [found.of(key) for key in "abc"] == ["of a", None, "of c"], "the newest are kept"
+    state = State(facts=FACTS, error="no face")
+    state.extremes.take("a", "9 of 9")
+    state.extremes.take("b", "8 of 9")
+    assert state.extremes.of("a") is None, "there is one picture"
     state.forget()
-    assert state == State()
+    assert state.extremes.of("b") is None and (state.facts, state.error) == (None, "")

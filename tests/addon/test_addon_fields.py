@@ -15,9 +15,10 @@ from blender_addon.core import config
 from blender_addon.core.field import Get
 from blender_addon.core.fields import field_of, fields
 from blender_addon.core.tables import check_shown, configuration, located, properties_of, section_of
-from blender_addon.core.texts import FOLDER, asks_for_folder
+from blender_addon.core.texts import FOLDER, MESHES, asks_for_folder
 from blender_addon.core.words import HELP, LIMITS, UNSET, titled
 from generator.errors import UsageError
+from generator.heads.folders import SUFFIXES
 from generator.plan.config import BuildConfig, config_toml, load_config
 from generator.plan.poses import ANGLES, grid_plan
 from generator.plan.setting import Choice, Info, Setting, setting
@@ -98,6 +99,7 @@ def test_properties_follow_from_the_table() -> None:
     assert units == ["GUESS", "um", "mm", "cm", "dm", "m"]
     assert made["poses_yaw"].options["max"] == 89.9 and made["poses_yaw"].options["size"] == 3
     assert made["poses_same"].kind == "BoolProperty"
+    assert ("uv", "UV", "") in made["dataset_passes"].options["items"]
 
 
 @dataclass(frozen=True)
@@ -286,3 +288,21 @@ def test_a_bad_configuration_is_refused_with_its_name(tmp_path: Path, text: str)
     path.write_text(text)
     with pytest.raises(UsageError, match=r"bad\.toml"):
         config.read_config(path)
+
+
+def test_numbers_have_their_units() -> None:
+    """Angles are shown in radians, which Blender writes as degrees; see units.py."""
+    options = Properties().options
+    assert (
+        options["render_lens_mm"]["subtype"]
+        == options["heads_eye_distance_mm"]["subtype"]
+        == "DISTANCE_CAMERA"
+    )
+    assert options["render_resolution"]["subtype"] == options["render_defocus_px"]["subtype"] == "PIXEL"
+    drawn = {field.name: field.drawn for field in fields()}
+    assert drawn["render_light_yaw_deg"] == "render_light_yaw_deg_angle"
+    assert drawn["poses_yaw"] == "poses_yaw_angle" and drawn["render_lens_mm"] == "render_lens_mm"
+
+
+def test_files_that_may_be_dropped_are_those_that_are_read() -> None:
+    assert MESHES == SUFFIXES

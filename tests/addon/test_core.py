@@ -45,7 +45,7 @@ def test_the_host_is_looked_up_in_the_written_order(tmp_path: Path, monkeypatch:
     monkeypatch.chdir(on_path.parent)
     with pytest.raises(host.HostMissing):
         host.find_host("", None, {"PATH": os.pathsep.join(["", "."])})
-    with pytest.raises(host.HostMissing, match=r"pip install 'headturn\[build\]'"):
+    with pytest.raises(host.HostMissing, match="press Set Up"):
         host.find_host("", None, {"PATH": ""})
 
 
@@ -59,7 +59,7 @@ def test_a_python_without_headturn_says_how_to_install_it(tmp_path: Path) -> Non
     bare = tmp_path / "python"
     bare.write_text(f'#!/bin/sh\ncd / && PYTHONPATH= exec "{sys.executable}" -S "$@"\n')
     bare.chmod(0o755)
-    with pytest.raises(host.HostMissing, match="pip install"):
+    with pytest.raises(host.HostMissing, match=r"has no Headturn of this version.*press Set Up"):
         host.check_host(host.find_host(str(bare), None, {}))
 
 
@@ -72,6 +72,16 @@ def test_a_host_without_bpy_renders_with_the_blender_that_asks() -> None:
     assert host.host_command(found, facts, ["verify", "d"], "/b")[1:] == ["verify", "d"]
     deep = ["verify", "d", "--deep=5"]
     assert host.host_command(found, facts, deep, "/b")[1:] == [*deep, "--blender", "/b"]
+
+
+def test_a_scene_of_a_newer_blender_is_rendered_with_that_one() -> None:
+    found, older = host.Host(("headturn",), "PATH"), host.HostFacts("1", "3.11", "4.5.15", "0.10", "21", None)
+    build = ["build", "a.toml"]
+    for saved_by, more in {(4, 3): [], (4, 5): [], (5, 2): ["--blender", "/b"], None: []}.items():
+        assert host.host_command(found, older, build, "/b", saved_by)[1:] == [*build, *more]
+    server = host.host_command(found, older, ["preview-server"], "/b", (5, 2))
+    assert server[1:] == ["preview-server", "--blender-of-scenes", "/b"]
+    assert host.host_command(found, older, ["verify", "d"], "/b", (5, 2))[1:] == ["verify", "d"]
 
 
 def test_progress_adds_up_events() -> None:
@@ -119,7 +129,8 @@ def test_headless_has_the_exit_codes_of_the_command_line(
 
 def test_the_extension_is_whole_and_private(extension_zip: Path) -> None:
     assert extension_zip.name == f"headturn-{__version__}.zip"
-    allowed = {"numpy", "bpy", "mathutils", "bpy_extras", "gpu", "gpu_extras", *sys.stdlib_module_names}
+    blenders = {"bpy", "bl_operators", "mathutils", "bpy_extras", "gpu", "gpu_extras"}
+    allowed = {"numpy", *blenders, *sys.stdlib_module_names}
     with zipfile.ZipFile(extension_zip) as archive:
         names = set(archive.namelist())
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())

@@ -75,7 +75,9 @@ def test_the_command_builds_what_the_host_builds(real_blender: RealBlender, smal
     said = real_blender.run(*arguments, "build", config, "--out", out, "--workers", "1")
     assert "rendering 0 of 3" in said.stdout and "3 images" in said.stdout
     assert same_content(Path(out), small_build / "host")
-    real_blender.run(*arguments, "verify", out)
+    (small_build / "temporary").mkdir()
+    real_blender.run(*arguments, "verify", out, TMPDIR=str(small_build / "temporary"))
+    assert not [*(small_build / "temporary").iterdir()]
     assert real_blender.run(*arguments, "verify", str(small_build), check=False).returncode == 1
     wrong = real_blender.run(*arguments, "build", "nowhere.toml", check=False)
     assert wrong.returncode == 2 and "nowhere.toml" in wrong.stderr
@@ -83,17 +85,27 @@ def test_the_command_builds_what_the_host_builds(real_blender: RealBlender, smal
     assert lost.returncode == 2 and "HEADTURN_PYTHON" in lost.stderr
 
 
-def test_without_the_extension_a_script_does_the_same(real_blender: RealBlender, small_build: Path) -> None:
+def test_without_the_extension_a_script_does_the_same(
+    real_blender: RealBlender, small_build: Path, tmp_path: Path
+) -> None:
     """It goes on with the host's dataset, whose units have the same names."""
     shutil.copytree(small_build / "host", small_build / "script")
     (small_build / "script" / "manifest.json").unlink()
     script, out = str(ROOT / "blender_addon" / "headless.py"), str(small_build / "script")
     flags = ("--background", "--factory-startup", "--python-exit-code", "1", "--python", script, "--")
     config = str(small_build / "small.toml")
-    said = real_blender.run(*flags, "build", config, "--out", out, "--workers", "1")
+    said = real_blender.run(*flags, "build", config, "--out", out, "--workers", "1", TMPDIR=str(tmp_path))
+    assert not [*tmp_path.iterdir()], "nothing is left, nor is it by the command"
     assert "continuing: 1 of 1 units are already there" in said.stdout, said.stdout
     assert same_content(Path(out), small_build / "host")
     assert real_blender.run(*flags, "verify", "/nowhere", check=False).returncode == 1
+
+
+def test_python_builds_to_the_end_or_says_why_not(real_blender: RealBlender, tmp_path: Path) -> None:
+    script = str(Path(__file__).with_name("build_from_python.py"))
+    flags = ("--background", "--python-exit-code", "4", "--python", script, "--", str(tmp_path))
+    said = real_blender.run(*flags)
+    assert "passed" in said.stdout and "rendering 0 of 3" in said.stdout, said.stdout + said.stderr
 
 
 def test_modules_beside_the_data_are_not_imported(

@@ -1,41 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in a real window, with real clicks: five sittings, each in a Blender of its own.
-
-Screenshots stay in .test-output/addon.
-"""
+"""The panel in a real window, with real clicks: five sittings, each in a Blender of its own."""
 
 from __future__ import annotations
 
 import json
-import shutil
-from pathlib import Path
 
 import pytest
-from real_blender import ROOT, RealBlender
+from real_blender import RealBlender
+from sitting import sit
 
+from generator.dataset.format.heads_table import read_heads
 from generator.dataset.proof.verify import verify_dataset
 from generator.picture.settled import settled
 from generator.plan.config import load_config
 from generator.plan.view_plan import drawn_values
 
-OUT = ROOT / ".test-output" / "addon"
-SITTINGS = Path(__file__).with_name("sittings")
-
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
-
-
-def sit(blender: RealBlender, name: str) -> Path:
-    """Go through a sitting to its end; returns the folder with what it left."""
-    out = OUT / name
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
-    script = str(SITTINGS / f"{name}.py")
-    done = blender.run_with_window("--python", script, HEADTURN_TEST_OUT=str(out))
-    said = done.stdout + done.stderr
-    (out / "said.txt").write_text(said, encoding="utf-8")
-    assert (out / "passed").exists(), said[-4000:]
-    assert "Traceback" not in said, said[-4000:]
-    return out
 
 
 def test_an_environment_is_named_and_what_is_missing_is_said(real_blender: RealBlender) -> None:
@@ -43,8 +23,14 @@ def test_an_environment_is_named_and_what_is_missing_is_said(real_blender: RealB
 
 
 def test_heads_are_loaded_and_turned(real_blender: RealBlender) -> None:
-    out = sit(real_blender, "heads")
+    out = sit(real_blender, "heads", HEADTURN_TEST_BLENDER=real_blender.executable)
     assert json.loads((out / "facts.json").read_text(encoding="utf-8"))["changed"] > 0.05
+    # And the head of a user's own scene, whose texture lies elsewhere.
+    assert json.loads((out / "mine.json").read_text(encoding="utf-8"))["rows"] == 3
+    report = verify_dataset(out / "ada")
+    assert report.ok, report.text()
+    [head] = read_heads(out / "ada")
+    assert [name for name, _ in head.file_sha256] == ["mine.blend", "../mine/eye.png", "../mine/skin.png"]
 
 
 def test_pictures_are_what_the_build_would_make(real_blender: RealBlender) -> None:

@@ -120,7 +120,8 @@ def run_in_wheel(python: str, script: str, *arguments: Path, profile: Path) -> N
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(profile)},
+        # another test of this process may have asked for safe paths: scripts here import each other
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(profile), "PYTHONSAFEPATH": ""},
     )
     assert "passed" in done.stdout and done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stderr, done.stderr
@@ -140,6 +141,14 @@ def test_the_extension_in_a_bpy_wheel(python: str, extension_zip: Path, head: Pa
     assert load_config(tmp_path / "saved-defaults.toml", {}) == BuildConfig()
     for file in files:
         assert load_config(file.with_name(f"saved-{file.name}"), {}) == load_config(file, {}), file.stem
+
+
+@pytest.mark.parametrize("python", [sys.executable, *OTHERS])
+def test_what_is_the_users_stays_as_it_is(
+    python: str, extension_zip: Path, head: Path, tmp_path: Path
+) -> None:
+    """The whole file, property by property, after everything that the panel can do."""
+    run_in_wheel(python, "untouched_session.py", extension_zip, head, tmp_path, profile=tmp_path / "profile")
 
 
 def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None:
@@ -163,7 +172,10 @@ def test_a_setting_more_needs_no_change_of_the_extension(tmp_path: Path) -> None
     registries.write_text(text.replace('("draw", {})', f'("draw", {entry})'), encoding="utf-8")
     script = tree / "scripts" / "build_extension.py"
     made = subprocess.run(
-        [sys.executable, str(script), "--out", str(tmp_path)], check=True, capture_output=True, text=True
+        [sys.executable, str(script), "--without-wheel", "--out", str(tmp_path)],
+        check=True,
+        capture_output=True,
+        text=True,
     )
     package = Path(made.stdout.strip())
     run_in_wheel(sys.executable, "more_settings_session.py", package, tmp_path, profile=tmp_path / "profile")

@@ -73,7 +73,7 @@ def drive(script: Callable[[], Iterator[Step]]) -> None:
             _end(9)
         return None
 
-    bpy.app.timers.register(tick, first_interval=1.0)
+    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)  # another file is no end
 
 
 def shot(name: str, suffix: str = ".png") -> np.ndarray:
@@ -180,15 +180,21 @@ def type_value(x: int, y: int, text: str) -> Iterator[Step]:
     event("A", "PRESS", x, y, ctrl=True)
     event("A", "RELEASE", x, y)
     yield 0.1
-    digits = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
-    names = {"-": "MINUS", ".": "PERIOD", **{str(k): name for k, name in enumerate(digits)}}
-    for character in text:
-        event(names[character], "PRESS", x, y, unicode=character)
-        event(names[character], "RELEASE", x, y)
-        yield 0.05
+    yield from strike(text, x, y)
     event("RET", "PRESS", x, y)
     event("RET", "RELEASE", x, y)
     yield 0.3
+
+
+def strike(text: str, x: int, y: int) -> Iterator[Step]:
+    """Type letters, digits, a minus, a point, with the mouse here."""
+    digits = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
+    names = {" ": "SPACE", "-": "MINUS", ".": "PERIOD", **{str(k): name for k, name in enumerate(digits)}}
+    for character in text:
+        name = names.get(character, character.upper())
+        event(name, "PRESS", x, y, unicode=character)
+        event(name, "RELEASE", x, y)
+        yield 0.05
 
 
 def open_tab() -> Iterator[Step]:

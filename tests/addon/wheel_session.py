@@ -32,7 +32,7 @@ def main(package: str, head: str, folder: str) -> None:
         settings.save(own.headturn, file.with_name(f"saved-{file.name}"))
     settings.load(own.headturn, Path(folder) / "saved-defaults.toml")  # what a file leaves out is the default
     before = {name: len(getattr(bpy.data, name)) for name in ("meshes", "materials", "worlds", "cameras")}
-    scene = studio.studio_scene()
+    scene = studio.studio_scene(own)
     studio.show_package(scene, Path(head), 120.000000001)
     assert settings.radius_mm(scene.headturn) == 120.000000001
     assert scene != own and scene.headturn.head is not None and own.headturn.head is None
@@ -63,7 +63,7 @@ def main(package: str, head: str, folder: str) -> None:
     shown.render_ambient, shown.render_margin, shown.render_projection = 0.9, 2.0, "orthographic"
     shown.render_light_yaw_deg, shown.render_background = -40, (0.0, 0.0, 1.0)
     assert made == [thing.as_pointer() for thing in (shown.head, shown.head.data, scene.camera, scene.world)]
-    assert scene.camera.data.type == "ORTHO" and scene.cycles.samples == 4
+    assert scene.camera.data.type == "ORTHO" and scene.cycles.samples == 1
     shown.render_samples_unset, shown.render_samples = False, 9
     assert scene.cycles.samples == scene.cycles.preview_samples == 9
     shown.render_samples_unset = True

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sitting: load heads, turn one by slider and by number, undo, scrub the timeline, switch us off and on."""
+"""A sitting: load heads, turn one by slider and by number, undo, scrub the timeline, switch us off and on;
+then the same with a head in a scene of the user's own."""
 
 from __future__ import annotations
 
@@ -13,19 +14,23 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from ui_steps import axis_pixels, begin, key, load_heads, shown, state  # isort: skip
-from ui_driver import EXTENSION, OUT, Step, drag, drive, region, shot, type_value, view_pixels, widgets
+from ui_steps import axis_pixels, begin, key, listing, load_heads, shown  # isort: skip
+from selected_steps import as_the_host_sees_blender, use_selected
+from ui_driver import EXTENSION, OUT, Step, area, drag, drive, region, shot, type_value, view_pixels, widgets
 
 
 def steps() -> Iterator[Step]:
     """Every step in order; each relies on the one before."""
     own = bpy.context.scene
     yield from begin()
+    as_the_host_sees_blender()
+    viewed = view_of_mine()
     yield from load_heads(2)
+    package = Path(shown().package)
     assert bpy.context.scene != own, "the user's own scene must stay as it was"
     assert [o.name for o in own.objects] == ["Cube", "Light", "Camera"] or len(own.objects) == 3
     assert shown().subject and shown().expression == "neutral"
-    assert len(state.subjects()) == 2
+    assert len(listing().subjects()) == 2
     before = view_pixels(shot("05-loaded"))
 
     # A slider turns the head in the pixels and rebuilds nothing.
@@ -81,6 +86,23 @@ def steps() -> Iterator[Step]:
     shot("08-timeline")
     shown().on_timeline = False
 
+    # Back to the user's scene, whose 3D view is as it was; also where it is chosen in Blender's own menu.
+    studio, was = scene, (shown().yaw, shown().pitch, shown().roll)
+    assert bpy.ops.headturn.leave() == {"FINISHED"}
+    yield 0.3
+    assert bpy.context.scene == own and view_of_mine() == viewed, (viewed, view_of_mine())
+    shot("16-back")
+    for there in (studio, own, studio):
+        bpy.context.window.scene = there
+        yield 0.3
+        if there == own:
+            assert view_of_mine() == viewed, (viewed, view_of_mine())
+        else:
+            assert bpy.ops.headturn.look() == {"FINISHED"}
+            yield 0.3
+            assert view_of_mine() != viewed
+    assert (shown().yaw, shown().pitch, shown().roll) == was
+
     # Off and on again: the axes go and come back.
     import addon_utils
 
@@ -96,6 +118,23 @@ def steps() -> Iterator[Step]:
     yield 0.3  # a redraw may take longer than that, and ours comes after it
     back = axis_pixels(shot("19-enabled-again"))
     assert seen > 150 and gone < 10 and back > 0.9 * seen, (seen, gone, back)
+
+    yield from use_selected(package)
+
+
+def view_of_mine() -> tuple[object, ...]:
+    """How the 3D view looks, and from where."""
+    space = area().spaces.active
+    seen, shading = space.region_3d, space.shading
+    place = [round(x, 4) for x in (*seen.view_rotation, *seen.view_location, seen.view_distance)]
+    return (
+        seen.view_perspective,
+        place,
+        shading.type,
+        shading.light,
+        shading.color_type,
+        shading.background_type,
+    )
 
 
 drive(steps)

@@ -14,7 +14,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from ui_steps import begin, idle, load_heads, shown, state  # isort: skip
+from ui_steps import begin, fold, idle, load_heads, look, shown, state  # isort: skip
 from ui_driver import EXTENSION, OUT, Step, click, drive, scroll, shot, widgets
 
 RENDER_WAIT = 0.5
@@ -27,55 +27,54 @@ def steps() -> Iterator[Step]:
     pictures = import_module(f"{EXTENSION}.pictures")
     shown().render_resolution = 256
     shown().yaw, shown().pitch, shown().roll = 20, -5, 0
-    assert state.look is None and not pictures.kept(pictures.LOOK)
+    assert look() is None and not pictures.kept(pictures.LOOK)
 
     # The button: a picture, a seed, and the value of every draw.
     yield from to_the_looks()
     roll, *_ = yield from widgets("buttons")
     yield from click(*roll.middle)
-    yield lambda: state.look is not None or bool(state.error)
+    yield lambda: look() is not None or bool(state.error)
     yield idle
     assert not state.error, state.error
-    assert state.look.seed == shown().look_seed and pictures.kept(pictures.LOOK)
-    assert len(state.look.values()) > 15
+    assert look().seed == shown().look_seed and pictures.kept(pictures.LOOK)
+    assert len(look().values()) > 15
     yield RENDER_WAIT
     shot("30-look")
 
     # Another throw, with the mouse where it is.
-    before = state.look
+    before = look()
     yield from click(*roll.middle)
-    yield lambda: state.look is not before
+    yield lambda: look() is not before
     yield idle
 
     # A seed that is typed is its look; the same one again is the same.
-    thrown = state.look
+    thrown = look()
     shown().look_seed = 7
-    yield lambda: state.look.seed == 7
+    yield lambda: look().seed == 7
     yield idle
-    seven = state.look
+    seven = look()
     picture = keep("seven")
     assert seven.drawn != thrown.drawn
     yield RENDER_WAIT
     shot("31-seven")
     assert bpy.ops.headturn.roll_dice() == {"FINISHED"}
-    yield lambda: state.look is not seven
+    yield lambda: look() is not seven
     yield idle
     assert keep("other") != picture
     shown().look_seed = 7
-    yield lambda: state.look.seed == 7
+    yield lambda: look().seed == 7
     yield idle
-    assert state.look == seven and keep("again") == picture
+    assert look() == seven and keep("again") == picture
 
     # Another pose is another row: the panel says so, until the look is shown again.
     panel = import_module(f"{EXTENSION}.core.panel")
     settings = import_module(f"{EXTENSION}.settings")
-    head = settings.chosen_head(shown())
     shown().yaw = -10
-    assert panel.look(state, head, settings.pose(shown())).icon == "INFO"
+    assert panel.look(look(), settings.pose(shown())).icon == "INFO"
     assert bpy.ops.headturn.show_look() == {"FINISHED"}
-    yield lambda: state.look != seven
+    yield lambda: look() != seven
     yield idle
-    assert panel.look(state, head, settings.pose(shown())).icon == "CHECKMARK"
+    assert panel.look(look(), settings.pose(shown())).icon == "CHECKMARK"
 
     # A sheet; and what is drawn where it is written down.
     assert bpy.ops.headturn.look_sheet() == {"FINISHED"}
@@ -88,7 +87,7 @@ def steps() -> Iterator[Step]:
     shot("32-sheet")
     shown().draws = "ambient=uniform:0.1,0.9 background=uniform:0,1;0.5;0.5"
     assert bpy.ops.headturn.show_look() == {"FINISHED"}
-    yield lambda: {*state.look.drawn} == {"ambient", "background"}
+    yield lambda: look() is not None and {*look().drawn} == {"ambient", "background"}
     shown().draws = "ambient=uniform:0.9,0.1"
     assert bpy.ops.headturn.show_look() == {"FINISHED"}
     yield lambda: "the low end 0.9 is above the high end 0.1" in state.error
@@ -100,21 +99,13 @@ def steps() -> Iterator[Step]:
 
 def to_the_looks() -> Iterator[Step]:
     """Fold the panels before and after it, so that Roll the Dice is the first button."""
-    panel = import_module(f"{EXTENSION}.panel")
-    panel.unregister()
-    for cls in (panel.HeadsPanel, panel.PosePanel, panel.PosesPanel, panel.BuildPanel):
-        cls.bl_options = {"DEFAULT_CLOSED"}
-        cls.bl_idname += "_"  # Blender remembers which panels were closed, by their names
-    panel.SelectionPanel.bl_parent_id = panel.HeadsPanel.bl_idname
-    panel.register()
-    yield 0.5
-    yield from scroll(-60)
+    yield from fold("HeadsPanel", "PosePanel", "PosesPanel", "LookPanel", "BuildPanel")
 
 
 def keep(name: str) -> bytes:
     """The picture of the look, kept for whoever wants to see it."""
     import_module(f"{EXTENSION}.looks")
-    file = Path(bpy.app.tempdir).parent / f"headturn-look-{bpy.context.scene.name}" / "000.png"
+    file = import_module(f"{EXTENSION}.folders").scratch("look") / "000.png"
     shutil.copyfile(file, OUT / f"{name}.png")
     return file.read_bytes()
 

@@ -14,16 +14,27 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from ui_driver import EXTENSION, OUT, Step, area, click, key, open_tab, scroll, view_pixels, widgets
+from ui_driver import EXTENSION, OUT, Step, area, click, event, key, open_tab, scroll, view_pixels, widgets
 
 session = import_module(f"{EXTENSION}.session")
 building = import_module(f"{EXTENSION}.building")
+keys = import_module(f"{EXTENSION}.keys")
 state = session.state
 
 
 def shown() -> Any:
     """scene.headturn of the scene in the window; another one after undo, and after the first head."""
     return bpy.context.scene.headturn
+
+
+def listing() -> Any:
+    """The heads of the source that is named."""
+    return keys.listing(shown())
+
+
+def look() -> Any:
+    """What the dice showed, None if that is of something else."""
+    return keys.look(shown())
 
 
 def idle() -> bool:
@@ -62,9 +73,34 @@ def press_build() -> Iterator[Step]:
     yield from click(*max(found, key=lambda widget: widget.top - widget.bottom).middle)
 
 
+def answer(name: str) -> Iterator[Step]:
+    """Press a key over a question in the middle of the window."""
+    x, y = bpy.context.window.width // 2, bpy.context.window.height // 2
+    event("MOUSEMOVE", "NOTHING", x, y)
+    yield 0.2
+    event(name, "PRESS", x, y)
+    event(name, "RELEASE", x, y)
+    yield 0.5
+
+
 def to_the_end() -> Iterator[Step]:
     """Scroll down to the Build panel."""
     yield from scroll(60)
+
+
+def fold(*closed: str) -> Iterator[Step]:
+    """Have these panels closed, by the names of their classes, and all others open."""
+    panel = import_module(f"{EXTENSION}.panel")
+    panel.unregister()
+    for cls in vars(panel).values():
+        if isinstance(cls, type) and issubclass(cls, bpy.types.Panel) and hasattr(cls, "bl_idname"):
+            cls.bl_options = {"DEFAULT_CLOSED"} if cls.__name__ in closed else set()
+            cls.bl_idname += "x"  # Blender remembers which panels were closed, by their names
+            if hasattr(cls, "bl_parent_id"):
+                cls.bl_parent_id += "x"
+    panel.register()
+    yield 0.5
+    yield from scroll(-60)
 
 
 def axis_pixels(image: np.ndarray) -> int:
@@ -74,12 +110,17 @@ def axis_pixels(image: np.ndarray) -> int:
 
 
 __all__ = [
+    "answer",
     "axis_pixels",
     "begin",
     "building",
+    "fold",
     "idle",
     "key",
+    "keys",
+    "listing",
     "load_heads",
+    "look",
     "press_build",
     "press_load",
     "session",
