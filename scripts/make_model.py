@@ -77,6 +77,11 @@ TRAINING = (
     *(Build("train3", 48, 1103, 1, 16, f"--yaw=-88,88 --pitch=-35,35 --roll=-40,40 {FAR}"),) * 2,
 )
 """The last, profiles that seldom look up or down, is gone over twice an epoch."""
+JUDGES = Build(
+    "judges", 12, 7305, 1, 12, "--yaw=-89,89 --pitch=-25,25 --roll=-25,25 --distance 3000 --zoom", 256
+)
+"""Plain images that the confidence is calibrated on, twice, beside the varied ones of who is held out:
+photographs are harder than these, and easier than those."""
 TESTS = {
     "Parametric heads it has never seen, from three metres, in plain images": Build(
         "test_plain", 24, 9021, 1, 12, f"{BOUNDS} --distance 3000 --zoom", 256
@@ -87,6 +92,9 @@ TESTS = {
 }
 ICT_TEST = Build("test_ict", 24, 9025, 1, 12, f"{BOUNDS} {VARIED}", 256)
 BEYOND = Build("test_beyond", 12, 9024, 1, 16, f"--yaw=-85,85 --pitch=-60,60 --roll=-60,60 {VARIED}", 256)
+PROFILE = Build(
+    "test_profile", 12, 9026, 0, 24, "--yaw=-89,89 --pitch=-20,20 --roll=-20,20 --distance 3000 --zoom", 256
+)
 OTHERS = Build("others", 0, 9023, 0, 128, f"{BOUNDS} {VARIED}", 256)
 
 
@@ -146,10 +154,26 @@ def main() -> None:
     source = f"ict:{given.ict.absolute()}" if given.ict else "parametric"
 
     grid, *training = (build(one, work, given.scale, source) for one in (GRID, *TRAINING))
+    judges = build(JUDGES, work, given.scale, source)
     model = work / "model"
-    fit = [*_python("downstream_hpe"), "fit", str(grid), "--out", str(model), "--missing", "keep", "--json"]
+    fit = [
+        *_python("downstream_hpe"),
+        "fit",
+        str(grid),
+        "--out",
+        str(model),
+        "--missing",
+        "keep",
+        "--partial",
+        "--json",
+    ]
     fit += ["--threads", "1"]
     fit += [word for path in training for word in ("--extra", str(path))]
+    fit += [
+        word
+        for path in (*dict.fromkeys((grid, *training)), *[judges] * 2)
+        for word in ("--calibrate", str(path))
+    ]
     card = json.loads(run(fit + (["--epochs", str(given.epochs)] if given.epochs else [])))
 
     tests = [(name, one, "parametric") for name, one in TESTS.items()]
@@ -164,6 +188,9 @@ def main() -> None:
         measured.append(f"{name}:\n\n{table(said, 'estimator')}\n")
     beyond = build(BEYOND, work, given.scale, source)
     said = evaluated(model, beyond, work / "report" / BEYOND.name, "--all")
+    partial = evaluated(model, beyond, work / "report" / "partial", "--all", "--partial")
+    profile = build(PROFILE, work, given.scale, source)
+    sideways = evaluated(model, profile, work / "report" / PROFILE.name, "--all")
 
     given.models.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(model / "model.onnx", given.models / f"{NAME}.onnx")
@@ -178,11 +205,16 @@ def main() -> None:
         "size": f"{size:.1f}",
         "builds": "\n".join(
             shlex.join(["headturn", *one.command(Path("work"), 1.0, shown)[3:]])
-            for one in dict.fromkeys((GRID, *TRAINING))
+            for one in dict.fromkeys((GRID, *TRAINING, JUDGES))
         ),
         "extra": " ".join(f"--extra work/{one.name}" for one in TRAINING),
+        "calibrate": " ".join(
+            f"--calibrate work/{one.name}" for one in (*dict.fromkeys((GRID, *TRAINING)), JUDGES, JUDGES)
+        ),
         "measured": "\n".join(measured).strip(),
         "photographs": photographs(model, given.photographs),
+        "profile": table(sideways, "estimator"),
+        "partial": f"{table(partial, 'estimator')}\n\n{table(partial, 'confidence')}",
         "beyond": f"{table(said, 'estimator')}\n\n{table(said, 'confidence')}",
     }
     text = CARD.read_text(encoding="utf-8")
