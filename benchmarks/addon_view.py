@@ -85,7 +85,7 @@ def slider() -> Iterator[None]:
     """The extension's."""
     from bl_ext.user_default.headturn import studio
 
-    area, scene = view(), studio.studio_scene()
+    area, scene = view(), studio.studio_scene(bpy.context.scene)
     studio.show_package(scene, Path(PACKAGE), 120.0)
     shown, turns, updates = scene.headturn, [], []
     area.spaces.active.show_region_ui = True

@@ -24,6 +24,7 @@ from pathlib import Path
 
 import psutil
 from resident import Resident
+from results import Figure, write_json
 
 from generator.execution.build.run import build
 from generator.execution.executors.open import open_executor
@@ -186,6 +187,7 @@ def main() -> None:
     parser.add_argument("--executors", default="serial,local,ray", help="which, separated by commas")
     parser.add_argument("--no-quality", action="store_true")
     parser.add_argument("--variety", help="that one beside none, by turns, and nothing else")
+    parser.add_argument("--json", type=Path, help="write what was measured, for history.py")
     arguments = parser.parse_args()
     load = os.getloadavg()[0]
     print(f"cores: {len(available_cores())}; load before: {load:.1f}; 256 x 256, one parametric head")
@@ -211,11 +213,15 @@ def main() -> None:
             print(f"{name:8} {rate / naive:6.1f} x naive, {rate / limit:4.0%} of the limit")
         if {"local", "ray"} <= set(rates):
             print(f"ray's overhead over local: {1 - rates['ray'] / rates['local']:.1%}")
+        figures = [Figure("naive script", naive, "images/s")]
+        figures += [Figure(f"fast, {name}", rate, "images/s", rate / naive) for name, rate in rates.items()]
         if not arguments.no_quality:
             rate = timed_build(
                 folder / "heads", "quality", "local", arguments.frames // 8, folder / "quality"
             )
             print(f"quality  {rate / naive:6.1f} x naive")
+            figures.append(Figure("quality, local", rate, "images/s", rate / naive))
+        write_json(arguments.json, "build.py", figures)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,23 +33,42 @@ SLOW_FIXTURES = {
 
 # The same examples in every run, so that what was red stays red; --hypothesis-profile=search looks for
 # others. No deadline: a busy machine is no fault of the code.
-hypothesis.settings.register_profile("same", derandomize=True, max_examples=20, deadline=None, database=None)
+# A machine that is busy with something else makes inputs slowly: that is no fault of a test.
+hypothesis.settings.register_profile(
+    "same",
+    derandomize=True,
+    max_examples=20,
+    deadline=None,
+    database=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.register_profile("search", max_examples=2000, deadline=None, print_blob=True)
 hypothesis.settings.load_profile("same")
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m "not slow" chooses
+LONGER = frozenset((Path(__file__).parent / "longer.txt").read_text(encoding="utf-8").splitlines())
+"""Modules, by their paths in the checkout, that are left out of the quick tests though they are not slow."""
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test as slow that needs a slow fixture, directly or not."""
+    """Mark every test as slow that needs a slow fixture, directly or not, and as quick if it is one."""
     for item in items:
         if SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.slow)
+        if item.get_closest_marker("slow") is None and item.nodeid.partition("::")[0] not in LONGER:
+            item.add_marker(pytest.mark.quick)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Files that are slow throughout are not even imported for the quick tests: torch takes seconds."""
-    if config.option.markexpr != "not slow" or collection_path.suffix != ".py":
+    """Files that are slow throughout are not even imported for the other tests: torch takes seconds."""
+    if config.option.markexpr not in ("not slow", "quick") or collection_path.suffix != ".py":
         return None
+    if (
+        config.option.markexpr == "quick"
+        and collection_path.relative_to(config.rootpath).as_posix() in LONGER
+    ):
+        return True
     text = collection_path.read_text(encoding="utf-8")
     return True if re.search(r"^pytestmark = \[?\s*pytest\.mark\.slow", text, re.MULTILINE) else None
 
@@ -57,6 +77,18 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def _interruptible() -> None:
     """Ctrl-C works in what the tests start, even where they run in the background and it is ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def _own_environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What a command changes for its process (safe paths, for one) is not the next test's."""
+    environment, path = dict(os.environ), list(sys.path)
+    yield
+    monkeypatch.undo()  # what it puts back comes first
+    if os.environ != environment:
+        os.environ.clear()
+        os.environ.update(environment)
+    sys.path[:] = path
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -30,7 +30,7 @@ def headturn(*arguments: str | Path, monkeypatch: pytest.MonkeyPatch) -> int:
 
 COMMANDS = [
     *([], ["heads"], ["heads", "make"], ["heads", "list"], ["build"], ["verify"], ["preview"]),
-    *(["export"], ["report"], ["compact"], ["replay"], ["upgrade"]),
+    *(["export"], ["report"], ["compact"], ["replay"], ["upgrade"], ["doctor"]),
 ]
 
 

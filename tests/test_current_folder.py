@@ -12,8 +12,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from generator.interpreter import other_python_command, python_environment
+from generator.registries import FORMATS
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -36,6 +38,19 @@ print(json.dumps(sorted(sys.modules)))
 """
 """Prints every module that a build or any other command loads."""
 
+EXPORTS = """
+import sys
+from generator.cli import main
+for form in sys.argv[1:]:
+    sys.argv = ["headturn", "export", "d", "--format", form, "--out", form]
+    try:
+        main()
+    except SystemExit as stopped:
+        if stopped.code:
+            raise
+"""
+"""One process for all formats: what one imports, it would import alone, too."""
+
 OURS = ("generator", "downstream_hpe")
 
 
@@ -56,7 +71,8 @@ def scripts(folder: Path) -> dict[str, list[str]]:
     folder.mkdir()
     for package, name in (("generator", "headturn"), ("downstream_hpe", "downstream-hpe")):
         (folder / name).write_text(f"import sys\nfrom {package}.cli import main\nsys.exit(main())\n")
-    return {name: [sys.executable, str(folder / name)] for name in ("headturn", "downstream-hpe")}
+    (folder / "exports").write_text(EXPORTS)
+    return {name: [sys.executable, str(folder / name)] for name in ("headturn", "downstream-hpe", "exports")}
 
 
 MODULES = {
@@ -124,8 +140,7 @@ def test_every_command_and_its_children(tmp_path: Path, parametric_heads: Path, 
     if started == "as modules":
         return  # the rest is no other
     command("report d")
-    for form in ("nlml-hpe", "300w-lp", "6drepnet", "biwi", "coco", "huggingface", "croissant"):
-        command(f"export d --format {form} --out {form}")
+    command(" ".join(FORMATS), "exports")
     command("compact d --out merged")
     command(f"replay d {image.relative_to(data / 'd/images').with_suffix('').as_posix()}")
     command("environment")
@@ -165,7 +180,14 @@ def test_full_paths_of_the_user_are_kept(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_python_is_started_in_one_place() -> None:
-    allowed = {"generator/interpreter.py"}
+    # The second starts them with PYTHONSAFEPATH, and not where Python does not know that; the others look
+    # for a Python to make an environment of, and ask each in isolated mode.
+    allowed = {
+        "generator/interpreter.py",
+        "downstream_hpe/prediction/workers.py",
+        "blender_addon/setting_up.py",
+        "blender_addon/core/pythons.py",
+    }
     starts = re.compile(
         r"sys\.executable|^\s*(import|from) multiprocessing|ProcessPoolExecutor", re.MULTILINE
     )
@@ -182,3 +204,16 @@ def test_an_empty_entry_of_the_users_path_counts_no_more(tmp_path: Path) -> None
     mark = plant(tmp_path / "data", {"numpy", "pyarrow", "typer", "rich"})
     done = run([*MODULES["headturn"], "heads", "list", "."], tmp_path / "data", PYTHONPATH=f":{ROOT}:.")
     assert done.returncode == 2 and not mark.exists(), done.stderr
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="--workers needs Python 3.11")
+def test_processes_that_look_at_pictures_take_nothing_from_there(tmp_path: Path) -> None:
+    """multiprocessing starts them with `python -c`, which looks there first."""
+    pytest.importorskip("mediapipe")
+    data = tmp_path / "data"
+    mark = plant(data, {"numpy", "PIL", "random", "multiprocessing", "cv2"})
+    for name in "ab":
+        Image.new("RGB", (64, 64)).save(data / f"{name}.png")
+    done = run([*MODULES["downstream-hpe"], "predict", ".", "--workers", "2"], data)
+    assert not mark.exists(), mark.read_text()
+    assert "a.png: no face found" in done.stdout, done.stderr

@@ -11,7 +11,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import make_model
 
 LEARNED = (make_model.GRID, *make_model.TRAINING)
-MEASURED = (*make_model.TESTS.values(), make_model.ICT_TEST, make_model.BEYOND, make_model.OTHERS)
+MEASURED = (
+    *make_model.TESTS.values(),
+    make_model.ICT_TEST,
+    make_model.BEYOND,
+    make_model.PROFILE,
+    make_model.OTHERS,
+)
 
 
 def option(command, name):
