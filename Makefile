@@ -15,6 +15,7 @@
 #   make outdated    which of the locked packages have newer releases, and which are held back
 #   make lock        renews requirements/lock-*.txt: every file that is installed, with its hash
 #   make dist        writes the sdists and wheels of a release, the extension, a bill of materials each and sums
+#   make release     dates the changelog's unreleased changes and tags them, VERSION=X.Y.Z
 #   make extension   writes the Blender extension into dist/
 #   make screenshots makes the pictures of docs/blender.md anew, in Debian's Blender
 #   make blender     sets up Debian's Blender for the tests that need a real one (root, Debian)
@@ -34,6 +35,7 @@ PIP = $(BIN)/pip --disable-pip-version-check install -q
 LOCKED = --require-hashes --no-deps --no-build-isolation
 FUZZ_SECONDS ?= 600
 FUZZ_FLAGS ?=
+RELEASE_FLAGS ?=
 MUTANTS ?=
 # As they come, sittings in Blender first: xdist takes modules of few tests last, and of those one would work alone.
 LONG_FIRST = --no-loadscope-reorder
@@ -43,7 +45,7 @@ QUICK_TMP = $(shell test -w /dev/shm && echo /dev/shm || echo $${TMPDIR:-/tmp})
 # Scripts here import each other from beside themselves.
 unexport PYTHONSAFEPATH
 
-.PHONY: demo demo-page test quick most coverage model test-next test-bpy lint bench bench-addon bench-heads soak fuzz mutants audit outdated docs pictures lock extension screenshots dist blender clean
+.PHONY: demo demo-page test quick most coverage model test-next test-bpy lint bench bench-addon bench-heads soak fuzz mutants audit outdated docs pictures lock extension screenshots dist release blender clean
 
 demo: $(VENV)/.build
 	@echo "== building 4 parametric heads at 75 poses each (under a minute)"
@@ -137,6 +139,10 @@ demo-page: $(VENV)/.page
 dist: $(VENV)/.dev
 	rm -rf $(DIST)
 	$(BIN)/python scripts/make_dist.py --out $(DIST)
+
+# Tags what CI has seen: VERSION=0.2.0, and RELEASE_FLAGS=--sign for your key.
+release: $(VENV)/.dev
+	@$(BIN)/python scripts/release.py $(VERSION) $(RELEASE_FLAGS)
 
 extension: $(VENV)/.wheel
 	$(BIN)/python scripts/build_extension.py --out dist
