@@ -5,8 +5,9 @@
     python scripts/release.py 0.2.0 [--sign]
 
 Writes the version and the heading, commits both and tags the commit as vX.Y.Z with the topics of the
-changelog. Refuses, with nothing changed, where files are not committed, nothing is unreleased, the version is not
-above the one before, or its tag is there. Pushing and uploading stay with whoever releases: CONTRIBUTING.md.
+changelog. Refuses, with nothing changed, where files are not committed, nothing is unreleased, the version
+is not above the one before, or its tag is there. Pushing and uploading stay with whoever releases:
+CONTRIBUTING.md.
 """
 
 from __future__ import annotations
