@@ -12,6 +12,7 @@ from mathutils import Matrix, Vector
 
 from generator.blender.scene_file import SURFACES, find_head, objects_of, open_scene
 from generator.blender.scene_mesh import placed_surfaces
+from generator.blender.scene_strands import show_rendered_strands
 from generator.errors import HeadError
 from generator.escape import quoted
 
@@ -118,6 +119,7 @@ def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
                 modifier.levels = min(modifier.render_levels, modifier.total_levels)
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
+    show_rendered_strands()
     scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
     scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
     layer = bpy.context.view_layer

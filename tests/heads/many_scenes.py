@@ -2,7 +2,8 @@
 """Scenes of every kind, and what is said of each, in one process: ``python many_scenes.py FOLDER``.
 
 FOLDER/said.json has an answer of generator.blender.describe a scene, FOLDER/turned.json what frozen_scenes.py
-says; FOLDER/cameras.json has Blender's own projection matrices of some cameras.
+says, FOLDER/hair.json what haired_scenes.py does; FOLDER/cameras.json has Blender's own projection
+matrices of some cameras.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import bpy
 from frozen_scenes import how_they_turn
+from haired_scenes import how_hair_is_seen
 
 from generator.blender import outside
 from generator.blender.describe import main as describe
@@ -166,6 +168,7 @@ def main(folder: Path) -> None:
         (folder / f"{name}.blend").write_bytes(data)
         said[name] = answer(folder / f"{name}.blend", "")
     (folder / "turned.json").write_text(json.dumps(how_they_turn(folder)))
+    (folder / "hair.json").write_text(json.dumps(how_hair_is_seen(folder)))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     file = scattered(folder)
     said["scattered"] = answer(file, "Rig")

@@ -107,6 +107,18 @@ def test_a_material_of_the_head_moves_no_surface(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_hair_hides_what_cycles_draws_over(folder: Path) -> None:
+    hair = json.loads((folder / "hair.json").read_text())
+    assert hair.pop("hidden") == {"drawn": 0.0, "tubes": 0.0}
+    assert {*hair} == {"own", "children", "curves"}
+    for kind, seen in hair.items():
+        for when in ("", "turned "):
+            assert seen[f"{when}alike"] > 0.95, (kind, seen)
+            assert seen[f"{when}drawn"] > 200, (kind, seen)
+            assert 0.9 < seen[f"{when}tubes"] / seen[f"{when}drawn"] < 1.2, (kind, seen)
+
+
+@pytest.mark.slow
 def test_cameras_are_blender_s_own(folder: Path) -> None:
     cases = json.loads((folder / "cameras.json").read_text())
     assert len(cases) == 27
