@@ -16,7 +16,7 @@ from generator.blender.stage import Stage
 from generator.blender.still import render_still
 from generator.labels import LABELS
 from generator.plan.passes import ALBEDO as ALBEDO_PASS
-from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, SEGMENTATION
+from generator.plan.passes import LABELS_A_PICTURE, OBJECT_INDEX, PAINTED, PAINTED_SAMPLES, SEGMENTATION
 from generator.registries import PASSES
 
 HEAD_INDEX, WORN_INDEX = 1, 2
@@ -60,6 +60,31 @@ def render_passes_alone(path: Path, passes: Sequence[str]) -> None:
         render_still()
     for switch in switches:
         setattr(layer, switch, False)
+
+
+def render_albedo_alone(path: Path) -> None:
+    """Render what share of white light the surfaces of a scene send back, as Cycles itself has it, into path.
+
+    Beside it lies the coverage that it is multiplied by, as alpha of the picture. Nothing is kept from
+    picture to picture: Cycles would keep the pattern of samples of which there were fewer or more.
+    """
+    scene = bpy.context.scene
+    layer = scene.view_layers[0].cycles
+    kept = ("samples", "pixel_filter_type", "filter_width", "use_adaptive_sampling", "use_denoising")
+    with (
+        _restored(scene.cycles, *kept),
+        _restored(scene.render, "film_transparent", "use_persistent_data"),
+        _restored(layer, "denoising_store_passes"),
+    ):
+        scene.render.use_persistent_data = False
+        layer.denoising_store_passes = True
+        scene.cycles.samples = PAINTED_SAMPLES
+        scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+        scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
+        compat.use_multilayer(scene.render.image_settings)
+        scene.render.film_transparent = True
+        scene.render.filepath = str(path)
+        render_still()
 
 
 @contextmanager

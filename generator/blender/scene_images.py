@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from mathutils import Matrix
 from generator.blender import compat
 from generator.blender.crop import Box
 from generator.blender.devices import Device
-from generator.blender.passes import render_passes_alone
+from generator.blender.passes import render_albedo_alone, render_passes_alone
 from generator.blender.scene_head import SceneHead
 from generator.blender.stage import set_lens
 from generator.blender.still import render_still
@@ -24,6 +25,7 @@ from generator.geometry.camera import Camera
 from generator.geometry.rotation import graphics_rotation, rotation_from_angles
 from generator.heads.scene import BlendScene, Eye
 from generator.plan.environment_light import EnvironmentLight
+from generator.plan.passes import ALBEDO, painted_file
 from generator.plan.render_settings import PLAIN
 from generator.plan.settings import Look
 from generator.plan.views import View, Views
@@ -87,22 +89,35 @@ class SceneImages:
 
     def render_passes(self, view: View, path: Path, passes: Sequence[str], worn: Sequence[Worn] = ()) -> None:
         """Render passes of a view; see :mod:`generator.blender.passes`."""
-        self._show(view)
         ours = {*self._head.objects}
         for one in bpy.data.objects:
             one.pass_index = HEAD_INDEX if one in ours else OTHER_INDEX
         for one in self._head.instanced():
             one.pass_index = HEAD_INDEX
+        with self._sharp(view):
+            render_passes_alone(path, passes)
+
+    def render_painted(self, views: Views, paths: Sequence[Path], passes: Sequence[str], worn: Any) -> None:
+        """Render the albedo of some views, each beside its path.
+
+        Raises HeadError for other passes: a scene's materials do not say what they are.
+        """
+        if [*passes] != [ALBEDO.name]:
+            raise HeadError(f"a scene has no pass {', '.join({*passes} - {ALBEDO.name})}")
+        for view, path in zip(views, paths, strict=True):
+            with self._sharp(view):
+                render_albedo_alone(path.with_name(painted_file(path.stem, ALBEDO.name)))
+
+    @contextmanager
+    def _sharp(self, view: View) -> Iterator[None]:
+        """Show a view as a pinhole camera sees it."""
+        self._show(view)
         lens = self._camera.data
         focused, lens.dof.use_dof = lens.dof.use_dof, False
         try:
-            render_passes_alone(path, passes)
+            yield
         finally:
             lens.dof.use_dof = focused
-
-    def render_painted(self, views: Views, paths: Sequence[Path], passes: Sequence[str], worn: Any) -> None:
-        """Raises HeadError: a scene's materials do not say what they are."""
-        raise HeadError(f"a scene has no pass {', '.join(passes)}")
 
     def _show(self, view: View) -> None:
         eye = self._placed.eye(view.camera)

@@ -9,10 +9,9 @@ from typing import Any
 from generator.errors import UsageError
 from generator.plan.config import BuildConfig
 from generator.plan.factors import FACTORS
-from generator.plan.passes import PAINTED
+from generator.plan.passes import SEGMENTATION
 from generator.plan.render_settings import Lens, Look, Render, Sensor
 from generator.plan.settings import section_settings
-from generator.registries import PASSES
 
 _LENS = {one.name for one in fields(Lens)} - {"resolution", "scene_camera", "variety"}
 _LIGHT = {one.name for one in fields(Look)} - {one.name for one in fields(Sensor)} - {"preset", "samples"}
@@ -36,7 +35,7 @@ def check_of_scenes(config: BuildConfig, scenes: bool) -> None:
         if set(FACTORS[factor].settings) & overruled:
             raise UsageError(f"--twins {factor}: a scene is rendered as it stands; leave {factor} out")
     for name in config.dataset.passes:
-        if PASSES.get(name).switch == PAINTED:
+        if name == SEGMENTATION.name:
             raise UsageError(f"--passes {name}: the materials of a scene do not tell it; leave {name} out")
 
 

@@ -16,6 +16,7 @@ from small_builds import config_for, run
 
 from generator.dataset.format.anchors_table import read_anchors
 from generator.dataset.format.heads_table import read_heads
+from generator.dataset.format.passes import read_channels
 from generator.dataset.proof.verify import verify_dataset
 from generator.errors import UsageError
 from generator.execution.build.run import BuildResult
@@ -29,7 +30,7 @@ from generator.plan.config import BuildConfig
 
 pytestmark = pytest.mark.slow
 
-PASSES = ["depth", "normal", "position", "object_index"]
+PASSES = ["depth", "normal", "position", "object_index", "albedo"]
 RENDER = {"resolution": 96, "scene_camera": True, "preset": "quality"}
 """Whatever the preset, which is of heads without a scene."""
 
@@ -119,6 +120,21 @@ def test_verify_proves_every_row_and_some_are_rendered_again_bit_by_bit(built: B
     assert again and all(one.same for one in again), [one.text() for one in again]
 
 
+def test_albedo_is_of_the_materials_whatever_the_light(built: BuildResult) -> None:
+    """Sun and a blue sky shine on a wall of a known colour that is glossy, and on a post that has none."""
+    name = pq.read_table(built.root / "data", partitioning=None).column("passes_path").to_pylist()[0]
+    found = read_channels(built.root / name)
+    albedo = np.stack([found[f"albedo.{channel}"] for channel in "RGB"], axis=-1)
+    there = found["object_index.X"] == 3
+    wall = np.array((0.5, 0.15, 0.1))
+    of_wall = np.abs(albedo - (wall + 0.04 * (1 - wall))).max(axis=-1) < 0.01
+    of_post = np.abs(albedo - 0.8).max(axis=-1) < 1e-3
+    assert (there & of_wall).sum() > 1000 and (there & of_post).sum() > 200
+    assert (there & ~of_wall & ~of_post).sum() < 0.05 * there.sum(), "edges alone are means of both"
+    head = albedo[found["object_index.X"] == 1]
+    assert np.isfinite(head).all() and (np.median(head, axis=0) > (0.5, 0.25, 0.15)).all()
+
+
 def test_one_worker_builds_the_same(config: BuildConfig, built: BuildResult, tmp_path: Path) -> None:
     assert run(config, tmp_path / "other", "serial").manifest.digest == built.manifest.digest
 
@@ -137,5 +153,5 @@ def test_what_a_scene_decides_is_not_asked_for(scene: Scene, tmp_path: Path) -> 
     ):
         with pytest.raises(UsageError, match=said):
             run(config_for(scene.file, render=render), tmp_path / "refused")
-    with pytest.raises(UsageError, match="--passes albedo"):
-        run(config_for(scene.file, dataset={"passes": ["albedo"]}), tmp_path / "refused")
+    with pytest.raises(UsageError, match="--passes segmentation"):
+        run(config_for(scene.file, dataset={"passes": ["segmentation"]}), tmp_path / "refused")

@@ -53,7 +53,10 @@ def test_a_camera_that_cannot_be_used_is_refused_with_its_reason() -> None:
             "--margin: a scene is rendered with its own cam",
         ),
         ({"dataset": {"twins": ["light"]}}, "--twins light: a scene is rendered as it stands"),
-        ({"dataset": {"passes": ["albedo"]}}, "--passes albedo: the materials of a scene do not tell it"),
+        (
+            {"dataset": {"passes": ["segmentation"]}},
+            "--passes segmentation: the materials of a scene do not tell it",
+        ),
     ],
 )
 def test_what_a_scene_decides_is_refused_in_a_line(values: dict[str, Any], said: str) -> None:

@@ -35,6 +35,9 @@ from litert_faces.installing import install_command
 COVERAGE = 1e-3
 """How near the classes of a pixel add up to what they cover."""
 
+ALBEDO_OF_SCENES = "Denoising Albedo"
+"""Cycles' name of the layer."""
+
 _HEADER = {
     "headturn.frame": "C (camera): x image-right, y image-down, z into the scene",
     "headturn.units": "depth and position in metres; normal of length 1; no surface is NaN",
@@ -123,7 +126,10 @@ def _painted(path: Path) -> list[np.ndarray]:
     """R, G, B and A of what a render worker painted, float32 [H, W]; the file is removed."""
     layers = _layers(read_channels(path))
     path.unlink()
-    [channels] = layers.values()
+    if ALBEDO_OF_SCENES in layers:
+        channels = {**layers[ALBEDO_OF_SCENES], "A": layers["Combined"]["A"]}
+    else:
+        [channels] = layers.values()
     return [channels[name].astype(np.float32) for name in "RGBA"]
 
 
