@@ -86,7 +86,7 @@ coverage: $(VENV)/.dev
 	$(BIN)/coverage report --skip-covered --sort cover
 
 # 200 kills of hosts and workers at random moments, and 200 flipped bits in any file of a finished dataset
-# and of an unfinished build, instead of the 30 and 24 of every test run.
+# and of an unfinished build, instead of the 15 and 24 of every test run.
 soak: $(VENV)/.dev
 	HEADTURN_KILLS=200 HEADTURN_FLIPS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 \
 		tests/execution/test_flips.py tests/execution/test_faults.py -k "killed or flips"

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -41,14 +42,14 @@ COMMANDS = {
 }
 
 
-def run(program: str, *arguments: bytes | str, hidden: str = "", **environment: str):
+ALONE = "from {package}.cli import main\nmain()\n"
+
+
+def run(program: str, *arguments: bytes | str, code: str = ALONE, hidden: str = "", **environment: str):
     package = {"headturn": "generator", "downstream-hpe": "downstream_hpe"}[program]
-    code = (
-        f"import sys\nfor name in {hidden.split()!r}:\n    sys.modules[name] = None\n"
-        f"from {package}.cli import main\nmain()\n"
-    )
+    hide = f"import sys\nfor name in {hidden.split()!r}:\n    sys.modules[name] = None\n"
     return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
+        [sys.executable, "-c", hide + code.format(package=package, program=program), *arguments],
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         capture_output=True,
         stdin=subprocess.DEVNULL,
@@ -56,17 +57,43 @@ def run(program: str, *arguments: bytes | str, hidden: str = "", **environment: 
     )
 
 
-def said(folder: Path, name: bytes, program: str, line: str, **environment: str) -> bytes:
-    """What a command said of a folder of that name, or rather how it ended if that was no answer."""
+ONE_BY_ONE = """
+import os, sys
+from {package}.cli import main
+lines, line = [], []
+for word in sys.argv[1:]:
+    if word == ";":
+        lines.append(line)
+        line = []
+    else:
+        line.append(word)
+for line in lines:
+    sys.argv = ["{program}", *line]
+    code = 0
+    try:
+        main()
+    except SystemExit as stopped:
+        code = stopped.code or 0
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.write(2, b"\\x1e%d\\x1e" % code)
+"""
+"""Runs command after command, each of which ends with ";": starting is most of what one takes."""
+
+
+def all_said(folder: Path, name: bytes, program: str, lines: Sequence[str], **environment: str) -> bytes:
+    """What commands said of a folder of that name, each of which gave an answer."""
     place = os.fsencode(folder) + b"/" + name
-    words = [os.fsencode(word).replace(b"{}", place) for word in line.split()]
-    done = run(program, *words, **environment)
-    assert b"Traceback" not in done.stderr and b"PYTHONIOENCODING" not in done.stderr, done.stderr.decode(
-        "latin-1"
-    )
-    assert done.returncode in (0, 1, 2, 3), done.stderr
-    if done.returncode in (1, 2) and not line.startswith("verify"):
-        assert done.stderr.splitlines()[-1].startswith(program.encode() + b": "), done.stderr
+    words = [os.fsencode(word).replace(b"{}", place) for line in lines for word in (*line.split(), ";")]
+    done = run(program, *words, code=ONE_BY_ONE, **environment)
+    assert done.returncode == 0, done.stderr
+    *answers, rest = done.stderr.split(b"\x1e")
+    assert not rest and len(answers) == 2 * len(lines), done.stderr
+    for line, text, code in zip(lines, answers[::2], answers[1::2], strict=True):
+        assert b"Traceback" not in text and b"PYTHONIOENCODING" not in text, text
+        assert code in (b"0", b"1", b"2", b"3"), (line, code)
+        if code in (b"1", b"2") and not line.startswith("verify"):
+            assert text.splitlines()[-1].startswith(program.encode() + b": "), (line, text)
     return done.stdout + done.stderr
 
 
@@ -75,7 +102,7 @@ def said(folder: Path, name: bytes, program: str, line: str, **environment: str)
     ("program", "line"), [("headturn", "heads list {}/nowhere"), ("downstream-hpe", "predict {}/nowhere.png")]
 )
 def test_a_path_that_cannot_be_shown(tmp_path: Path, program: str, line: str, environment: dict) -> None:
-    assert b"w\\" in said(tmp_path, "wörld".encode(), program, line, **environment)
+    assert b"w\\" in all_said(tmp_path, "wörld".encode(), program, [line], **environment)
 
 
 @pytest.mark.slow
@@ -92,8 +119,7 @@ def test_every_command(dataset: Path, tmp_path: Path, name: bytes, environment: 
     with open(folder + b"/config.toml", "w") as file:
         file.write("[poses]\nyaw = 'no'\n")
     for program, lines in COMMANDS.items():
-        for line in lines:
-            said(tmp_path, name, program, line, **environment)
+        all_said(tmp_path, name, program, lines, **environment)
 
 
 WITHOUT = {

@@ -30,7 +30,7 @@ from generator.sealed import sealed_line, unsealed
 
 Built = tuple[BuildConfig, Path]
 
-KILLS = int(os.environ.get("HEADTURN_KILLS", "30"))
+KILLS = int(os.environ.get("HEADTURN_KILLS", "15"))
 """Kills of hosts and workers; `make soak` asks for 200."""
 
 SEED = int(os.environ.get("HEADTURN_SEED", "0"))
