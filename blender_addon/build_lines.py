@@ -59,7 +59,8 @@ def draw_before(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         return
     message(layout, context, Line(much.line(), "INFO"))
     like, pixels = forecast.likeness(values, shown.workers)
-    if said := forecast.forecast(much, like, pixels, building.last_rate()):
+    rate = building.last_rate() or forecast.guess(values, shown.workers)
+    if said := forecast.forecast(much, like, pixels, rate):
         message(layout, context, Line(said, "BLANK1"))
 
 

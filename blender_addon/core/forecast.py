@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from generator.errors import HeadturnError
+from generator.heads.head import is_scene
 from generator.plan.head_source import is_made
 from generator.plan.settings import Values
+from generator.plan.variety import NONE
 
 from .build import Build
 from .found import Listing
@@ -22,6 +24,13 @@ from .tables import section_of
 MB = 10**6
 ENOUGH = 100
 """Images without which starting up is most of what a build took."""
+
+PER_CORE_S = {"fast": 28.0, "quality": 6.5}
+"""Images a second and core where nothing is known of this machine: benchmarks/history.csv has them of two."""
+IMAGE_BYTES, ROW_BYTES, GUESSED_PIXELS = 35_000.0, 10_000.0, 256**2
+"""Of an image of so many pixels, and of its row."""
+VARIED_TIME, VARIED_BYTES = 2.0, 2.0
+"""How much more an image is that is varied."""
 
 
 @dataclass(frozen=True)
@@ -82,17 +91,29 @@ def likeness(values: Values, workers: int) -> tuple[str, int]:
     return json.dumps(kept, sort_keys=True, default=str), render.resolution**2
 
 
+def guess(values: Values, workers: int) -> Rate | None:
+    """What a build may come to where none was yet; None of a scene, whose engine has its own speed."""
+    if is_scene(section_of(values, "heads").source):
+        return None
+    render = section_of(values, "render")
+    varied = render.variety != NONE
+    per_s = PER_CORE_S[render.preset] * (workers or os.cpu_count() or 1) / (VARIED_TIME if varied else 1)
+    return Rate(per_s, IMAGE_BYTES * (VARIED_BYTES if varied else 1), ROW_BYTES, GUESSED_PIXELS, "")
+
+
 def forecast(much: Amount, like: str, pixels: int, last: Rate | None) -> str:
-    """Time and space, and what they rest on; "" where nothing was built here yet."""
+    """Time and space, and what they rest on; "" where nothing is known."""
     if last is None or not last.per_s:
         return ""
     scale = pixels / last.pixels
     seconds = much.images / last.per_s * scale
     size = much.images * (last.image_bytes * scale + last.row_bytes) / MB
     space = f"{size / 1000:,.1f} GB" if size >= 1000 else f"{max(size, 1):,.0f} MB"
-    same = "your last build" if like == last.like else "your last build, which had other settings"
     time = f"{max(seconds, 1):.0f} s" if seconds < 100 else duration(seconds)
-    return f"about {time}, {space}, at the rate of {same}"
+    if not last.like:
+        return f"roughly {time}, {space}; better known after a first build"
+    other = "" if like == last.like else ", which had other settings"
+    return f"about {time}, {space}, at the rate of your last build{other}"
 
 
 def rate_of(build: Build, like: str, pixels: int) -> Rate | None:

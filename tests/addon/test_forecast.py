@@ -3,13 +3,26 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 from blender_addon.core.build import Build
-from blender_addon.core.forecast import Amount, Rate, amount, forecast, likeness, load, rate_of, save
+from blender_addon.core.forecast import (
+    PER_CORE_S,
+    Amount,
+    Rate,
+    amount,
+    forecast,
+    guess,
+    likeness,
+    load,
+    rate_of,
+    save,
+)
 from blender_addon.core.found import NOTHING, Listing
 from blender_addon.core.progress import Progress, Told
 
+ROOT = Path(__file__).resolve().parents[2]
 HEADS = Listing([("anna", "neutral"), ("anna", "smile"), ("bert", "neutral")])
 
 
@@ -46,6 +59,30 @@ def test_time_and_space_rest_on_the_last_build(tmp_path: Path) -> None:
     assert load(tmp_path / "rate.json") == last and load(tmp_path / "none.json") is None
     (tmp_path / "rate.json").write_text("[]")
     assert load(tmp_path / "rate.json") is None
+
+
+def test_before_a_first_build_it_is_guessed() -> None:
+    much, pixels = Amount(3, 693, 0), 256**2
+    said = forecast(much, "like", pixels, guess({}, 2))
+    assert said == "roughly 37 s, 94 MB; better known after a first build"
+    slower = [
+        guess({"render": {"preset": "quality"}}, 2),
+        guess({"render": {"variety": "photo"}}, 2),
+        guess({}, 1),
+    ]
+    assert all(one is not None and one.per_s < 56 for one in slower)
+    assert guess({"heads": {"source": "/my/scene.blend"}}, 2) is None, "its engine has its own speed"
+
+
+def test_the_guess_is_what_was_measured() -> None:
+    """Within a factor of two of every line of the history that says what two cores do."""
+    with (ROOT / "benchmarks" / "history.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["figure"].endswith(", local")]
+    assert {row["figure"].partition(",")[0] for row in rows} == set(PER_CORE_S)
+    for row in rows:
+        cores = int(row["machine"].partition(" x ")[0])
+        guessed = guess({"render": {"preset": row["figure"].partition(",")[0]}}, cores)
+        assert guessed is not None and 0.5 < guessed.per_s / float(row["value"]) < 2, row
 
 
 def test_a_build_says_its_rate(tmp_path: Path) -> None:
