@@ -28,16 +28,17 @@ def rows() -> UnitRows:
 
 
 @pytest.fixture(scope="session")
-def _template(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("template") / "dataset"
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished dataset of 2 heads x 18 poses, images as files, two misses a head; nobody changes it."""
+    root = tmp_path_factory.mktemp("source") / "dataset"
     build_dataset(root)
     return root
 
 
 @pytest.fixture
-def dataset(tmp_path: Path, _template: Path) -> Path:
-    """A finished dataset of 2 heads x 18 poses in 4 parts, images as files; the test may damage it."""
-    return Path(shutil.copytree(_template, tmp_path / "dataset"))
+def dataset(tmp_path: Path, source: Path) -> Path:
+    """A copy of it, in 4 parts, which the test may damage."""
+    return Path(shutil.copytree(source, tmp_path / "dataset"))
 
 
 @pytest.fixture(scope="session")

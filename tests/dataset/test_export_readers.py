@@ -22,14 +22,6 @@ IBUG_68 = FACE_MESH.ibug_68.indices
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory, build) -> Path:
-    """2 heads x 18 poses with exact landmarks, images as files; two misses a head."""
-    root = tmp_path_factory.mktemp("export") / "dataset"
-    build(root)
-    return root
-
-
-@pytest.fixture(scope="module")
 def rows(source) -> dict[str, dict]:
     """The table itself, by sample_id."""
     return {row["sample_id"]: row for row in pq.read_table(source / "data").to_pylist()}
