@@ -147,7 +147,7 @@ def test_a_new_column_is_in_schema_part_and_verify(looking: Path) -> None:
 
 
 def test_a_new_column_is_checked(looking: Path) -> None:
-    from test_verify import failures, rewrite
+    from damage import failures, rewrite
 
     values = read_part(looking / PART)["gaze"].to_pylist()
     rewrite(looking, {"gaze": [[0.0, 0.0, 2.0], *values[1:]]}, honest=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_verify import PART, failures, rewrite
+from damage import PART, failures, rewrite
 
 from generator.dataset.format.anchors_table import HeadAnchors, read_anchors
 from generator.dataset.format.heads_table import IDENTITY, read_heads

@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import small_dataset
+from damage import failures
 from PIL import Image
 from small_dataset import HEADS, SMALL_PLAN, draw_face, face_anchors, face_points, face_visible
-from test_verify import failures
 
 from generator.dataset.export.run import export_dataset
 from generator.dataset.format.digest import content_digest

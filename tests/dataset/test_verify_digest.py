@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 
 import pytest
+from damage import failures, rewrite
 from test_compact import Quiet
-from test_verify import failures, rewrite
 from typer.testing import CliRunner
 
 from generator.cli.app import app
