@@ -220,7 +220,9 @@ $(VENV)/audit/.ready: requirements/lock-audit.txt | $(VENV)/bin/python
 
 $(VENV)/mutants/.ready: requirements/lock-mutants.txt $(VENV)/.dev
 	$(PYTHON) -m venv $(VENV)/mutants
-	$(VENV)/mutants/bin/pip --disable-pip-version-check install -q $(LOCKED) -r requirements/lock-mutants.txt
+	grep '^setuptools==' requirements/lock-dev.txt > $(VENV)/setuptools.txt
+	for lock in $(VENV)/setuptools.txt requirements/lock-mutants.txt; do \
+		$(VENV)/mutants/bin/pip --disable-pip-version-check install -q $(LOCKED) -r $$lock || exit; done
 	$(BIN)/python -c "import site; print(site.getsitepackages()[0])" > $(VENV)/mutants/dev.txt
 	cp $(VENV)/mutants/dev.txt "$$($(VENV)/mutants/bin/python -c 'import site; print(site.getsitepackages()[0])')/dev.pth"
 	touch $@
