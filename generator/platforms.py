@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 
@@ -156,3 +157,11 @@ def platform_of(name: str) -> Platform:
 
 
 HERE = platform_of(sys.platform)
+
+
+def relative_path(path: Path, root: Path) -> str:
+    """A path from a folder, with "/"; the whole path where there is none, on another drive of Windows."""
+    try:
+        return Path(os.path.relpath(path, root)).as_posix()
+    except ValueError:
+        return path.absolute().as_posix()

@@ -14,7 +14,7 @@ import pytest
 from blender_addon.core import host
 from blender_addon.core.process import HostProcess
 from generator import platforms
-from generator.platforms import HERE, MacOS, Platform, Windows, platform_of
+from generator.platforms import HERE, MacOS, Platform, Windows, platform_of, relative_path
 
 
 class Child:
@@ -162,3 +162,16 @@ def test_commands_are_quoted_as_they_are_typed() -> None:
     command = ["/a b/python", "-m", "pip", "headturn[build]"]
     assert Platform().quoted(command) == "'/a b/python' -m pip 'headturn[build]'"
     assert Windows().quoted(command) == '"/a b/python" -m pip headturn[build]'
+
+
+def test_a_texture_on_another_drive_keeps_its_whole_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert relative_path(tmp_path / "textures" / "skin.png", tmp_path / "scenes") == "../textures/skin.png"
+
+    def another_drive(*_: object) -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr(os.path, "relpath", another_drive)
+    there = relative_path(tmp_path / "skin.png", tmp_path / "scenes")
+    assert there == f"{tmp_path.as_posix()}/skin.png" and tmp_path / "scenes" / there == tmp_path / "skin.png"

@@ -39,6 +39,7 @@ from generator.plan.settings import (
     section_settings,
 )
 from generator.plan.variety import NONE, VARIETY
+from generator.platforms import relative_path
 from generator.reading import MAX_CONFIG_BYTES, parse_toml, read_text
 
 
@@ -92,7 +93,7 @@ class BuildConfig:
         for setting in _paths(values):
             before, path = split_path(values[setting.section][setting.key])
             if not Path(path).is_absolute():
-                values[setting.section][setting.key] = before + _relative(self.located(path), root)
+                values[setting.section][setting.key] = before + relative_path(self.located(path), root)
         return replace(_validated(values, "configuration"), base=root)
 
 
@@ -204,13 +205,6 @@ def _paths(values: Mapping[str, Any]) -> list[Setting]:
         and isinstance(values[known.section].get(known.key), str)
         and split_path(values[known.section][known.key])[1]
     ]
-
-
-def _relative(path: Path, root: Path) -> str:
-    try:
-        return Path(os.path.relpath(path, root)).as_posix()
-    except ValueError:  # another drive
-        return str(path)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

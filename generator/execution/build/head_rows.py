@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from generator.dataset.format.heads_table import HEADS_FILE, HeadRow, read_heads
 from generator.errors import DatasetError
 from generator.execution.build.units import PlannedHead
 from generator.landmarks.topology import Topology
+from generator.platforms import relative_path
 
 
 def head_row(planned: PlannedHead, mesh_path: str, topology: Topology) -> HeadRow:
@@ -78,4 +78,4 @@ def changed_files(planned: Sequence[PlannedHead], root: Path) -> list[str]:
 
 def relative(path: Path, root: Path) -> str:
     """path relative to the root of its source, with "/"."""
-    return Path(os.path.relpath(path, root if root.is_dir() else root.parent)).as_posix()
+    return relative_path(path, root if root.is_dir() else root.parent)
