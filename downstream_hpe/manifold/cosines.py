@@ -147,7 +147,7 @@ def _fit_column(column: np.ndarray, angles: np.ndarray, betas: np.ndarray) -> np
         method="bounded",
         options={"xatol": 1e-12},
     )
-    candidates = [_solve(column, angles, beta) for beta in (best, float(refined.x), float(tried[-1]))]
+    candidates = [_solve(column, angles, beta) for beta in (best, float(refined.x))]
     return min(candidates, key=lambda candidate: candidate[1])[0]
 
 

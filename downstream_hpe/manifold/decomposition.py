@@ -10,7 +10,7 @@ import numpy as np
 from downstream_hpe.errors import DataError
 from downstream_hpe.geometry.rotation import ANGLES
 from downstream_hpe.manifold.missing_cells import fill_and_fit
-from downstream_hpe.manifold.slabs import Slabs
+from downstream_hpe.manifold.slabs import SlabsWithGaps
 from downstream_hpe.manifold.tucker import Decomposition, Ranks, refine, sequential
 
 __all__ = ["PAPER_RANKS", "Decomposition", "Ranks", "decompose"]
@@ -22,7 +22,7 @@ MODES = ("identity", *ANGLES)
 
 
 def decompose(
-    tensor: Slabs,
+    tensor: SlabsWithGaps,
     ranks: Ranks = PAPER_RANKS,
     *,
     refinements: int = 0,
@@ -63,7 +63,7 @@ def decompose(
     return fill_and_fit(tensor, ranks, refinements, tolerance, max_rounds, progress)
 
 
-def _check(tensor: Slabs, ranks: Ranks) -> None:
+def _check(tensor: SlabsWithGaps, ranks: Ranks) -> None:
     for mode, (name, size, rank) in enumerate(zip(MODES, tensor.shape, ranks, strict=False)):
         if not 1 <= rank <= size:
             what = "heads" if mode == 0 else f"{name} angles on the grid"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from downstream_hpe.errors import DataError
-from downstream_hpe.manifold.slabs import ArrayTensor, Slabs
+from downstream_hpe.manifold.slabs import ArrayTensor, SlabsWithGaps
 from downstream_hpe.manifold.tucker import Decomposition, Ranks, refine, sequential
 
 
@@ -17,16 +17,12 @@ from downstream_hpe.manifold.tucker import Decomposition, Ranks, refine, sequent
 class _Filled:
     """A tensor whose missing cells are those of a guess(head, missing): [cells, F]."""
 
-    tensor: Slabs
+    tensor: SlabsWithGaps
     guess: Callable[[int, np.ndarray], np.ndarray]
 
     @property
     def shape(self) -> tuple[int, int, int, int, int]:
         return self.tensor.shape
-
-    @property
-    def observed(self) -> np.ndarray:
-        return np.ones_like(self.tensor.observed)
 
     def slabs(self) -> Iterator[np.ndarray]:
         for head, (slab, seen) in enumerate(zip(self.tensor.slabs(), self.tensor.observed, strict=True)):
@@ -37,7 +33,7 @@ class _Filled:
 
 
 def fill_and_fit(
-    tensor: Slabs,
+    tensor: SlabsWithGaps,
     ranks: Ranks,
     refinements: int,
     tolerance: float,
@@ -70,7 +66,7 @@ def fill_and_fit(
     )
 
 
-def _mean_head(tensor: Slabs, ranks: Ranks, tolerance: float, max_rounds: int) -> np.ndarray:
+def _mean_head(tensor: SlabsWithGaps, ranks: Ranks, tolerance: float, max_rounds: int) -> np.ndarray:
     """The mean over heads, a start for missing cells: float64 [Dy, Dp, Dr, F].
 
     Where no head has a cell, the mean is completed by the same method, as a tensor of one head.
@@ -92,7 +88,7 @@ def _mean_head(tensor: Slabs, ranks: Ranks, tolerance: float, max_rounds: int) -
     return np.where(known[..., None], mean, fit.slab(0))
 
 
-def _observed_error(tensor: Slabs, fit: Decomposition) -> float:
+def _observed_error(tensor: SlabsWithGaps, fit: Decomposition) -> float:
     lost = total = 0.0
     for head, (slab, seen) in enumerate(zip(tensor.slabs(), tensor.observed, strict=True)):
         known = slab[seen]

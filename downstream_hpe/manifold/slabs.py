@@ -11,17 +11,20 @@ import numpy as np
 
 
 class Slabs(Protocol):
-    """What :func:`downstream_hpe.manifold.decomposition.decompose` reads.
-
-    shape: (N, Dy, Dp, Dr, F). observed: bool [N, Dy, Dp, Dr]. slabs(): N arrays [Dy, Dp, Dr, F],
-    head by head, the same at every call; NaN where not observed.
-    """
+    """A tensor head by head: shape (N, Dy, Dp, Dr, F); slabs(): N arrays [Dy, Dp, Dr, F], the same at every
+    call."""
 
     @property
     def shape(self) -> tuple[int, int, int, int, int]: ...
+    def slabs(self) -> Iterator[np.ndarray]: ...
+
+
+class SlabsWithGaps(Slabs, Protocol):
+    """What :func:`downstream_hpe.manifold.decomposition.decompose` reads: NaN where observed, bool
+    [N, Dy, Dp, Dr], says that nothing was."""
+
     @property
     def observed(self) -> np.ndarray: ...
-    def slabs(self) -> Iterator[np.ndarray]: ...
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ COLUMNS = (*HEAD_COLUMNS, *INDEX_COLUMNS, *ANGLE_COLUMNS, "rotation", "detected"
 
 @dataclass(frozen=True)
 class PoseTensor:
-    """The tensor of one dataset. Implements :class:`downstream_hpe.manifold.slabs.Slabs`.
+    """The tensor of one dataset. Implements :class:`downstream_hpe.manifold.slabs.SlabsWithGaps`.
 
     heads     "subject/expression" of each head, sorted
     axes_deg  three sorted float64 arrays: the angles of the grid
