@@ -232,3 +232,23 @@ def test_the_error_of_positions_is_in_pixels_and_in_either_direction() -> None:
     wall[0] = np.nan
     assert projection_error_px(wall, CAMERA) == pytest.approx(0, abs=1e-9)
     assert projection_error_px(np.full_like(wall, np.nan), CAMERA) == 0.0
+
+
+def test_every_row_is_looked_at_whatever_is_wrong_with_those_before(wall: Wall, tmp_path: Path) -> None:
+    """One lies elsewhere, of one nothing is there, one is of another hash and one of another size."""
+    names = wall.batch.column("sample_id").to_pylist()
+    paths = [f"exr/{name}.exr" for name in names]
+    hashes = ["0" * 64] * len(names)
+    for place in (2, 3, 4):
+        whole = wall.channels if place != 3 else {D: wall.channels[D][:32]}
+        (tmp_path / paths[place]).parent.mkdir(parents=True, exist_ok=True)
+        write_passes(whole, tmp_path / paths[place])
+        hashes[place] = passes_sha256(whole) if place == 3 else hashes[place]
+    paths[0] = "exr/elsewhere.exr"
+    for place in range(5, len(names)):
+        paths[place] = hashes[place] = ""
+    batch = replaced(replaced(wall.batch, "passes_path", pa.array(paths)), "passes_sha256", pa.array(hashes))
+    found = list(pass_problems(batch, context_of(tmp_path)))
+    expected = ("not where its passes belong", paths[1], "SHA-256 differs", "not the size", "SHA-256 differs")
+    assert len(found) == len(expected), found
+    assert all(text in line for text, line in zip(expected, found, strict=True)), found
