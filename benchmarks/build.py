@@ -134,9 +134,9 @@ def by_turns(heads: Path, variety: str, frames: int, folder: Path) -> None:
         each = ", ".join(f"{clock.rate:.1f}" for clock in turns)
         print(f"variety {name:8} {overall(turns):6.1f} images/s  (by turns {each})")
     ratio = overall(clocks[variety]) / overall(clocks["none"])
-    print(f"{variety} has {ratio:.0%} of the rate of none; resident memory, first and last quarter")
+    print(f"{variety} has {ratio:.0%} of the rate of none; resident memory from the first image to the last")
     print(f"(python is the host, which made {len(names) * (ROUNDS + 1)} builds):")
-    print(sampler.quarters())
+    print(sampler.text(points=16))
 
 
 def overall(turns: list[Clock]) -> float:

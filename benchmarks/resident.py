@@ -65,16 +65,3 @@ class Resident(threading.Thread):
                 line += "\n    " + " ".join(f"{size:.0f}" for size in chosen)
             lines.append(line)
         return "\n".join(lines)
-
-    def quarters(self) -> str:
-        """A line a process: its mean in the first and in the last quarter of the samples, and the growth."""
-        lines = []
-        for (_, kind), curve in sorted(self.curves.items(), key=lambda item: item[0][1]):
-            quarter = len(curve) // 4
-            if not quarter:
-                continue
-            first, last = (
-                sum(size for _, size in part) / quarter for part in (curve[:quarter], curve[-quarter:])
-            )
-            lines.append(f"  {kind:32} {first:6.1f} MiB, then {last:6.1f} MiB, {last / first - 1:+.1%}")
-        return "\n".join(lines)
