@@ -68,6 +68,10 @@ def test_nlml_hpe_as_its_code_looks_for_files(source, rows, tmp_path, suffix):
                 np.testing.assert_allclose(derived.as_matrix(), rotation(rows[name]), atol=1e-12)
                 found.add(path)
     assert found == {path for path in (tmp_path / "out").glob("*/*/*")} and len(found) == 36
+    if suffix == "jpg":
+        with Image.open(found.pop()) as image:
+            sampled = {(across, down) for _, across, down, _ in image.layer}
+        assert sampled == {(1, 1)}, "colours are as fine as brightness"
 
 
 def test_facescape_ids_are_kept(tmp_path, build):
