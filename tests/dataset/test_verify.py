@@ -293,7 +293,7 @@ def test_no_anchors_table(dataset):
     assert "anchors.parquet: cannot be read" in failures(verify_dataset(dataset))["heads and poses"]
 
 
-def test_of_rows_that_cannot_be_read_nothing_is_said(dataset: Path) -> None:
+def test_of_rows_that_cannot_be_read_nothing_is_said(dataset):
     for part in read_manifest(dataset).parts:
         content = bytearray((dataset / part.path).read_bytes())
         content[len(content) // 2] ^= 1
