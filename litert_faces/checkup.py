@@ -101,7 +101,9 @@ def detectors(
         try:
             some.append(Finding("detector", "ok", open_one(name), purpose))
         except faults as error:
-            some.append(Finding("detector", "missing", f"{name}: {error}", purpose, remedy))
+            # The remedy has a line of its own, and the name need not stand there twice.
+            reason = str(error).removeprefix(f"{name}: ").partition(": pip install")[0]
+            some.append(Finding("detector", "missing", f"{name}: {reason}", purpose, remedy))
     yield from some
     if all(one.state == "missing" for one in some):
         yield Finding("detector", "missing", "none can be opened", *last, vital=True)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
-from generator.cli.console import JsonFlag, err, out, plural, say, shown
+from generator.cli.console import JsonFlag, err, out, say, shown
 from generator.cli.reporter import TerminalReporter
 from generator.limits import MAX_SEED
+from generator.words import plural
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,7 +52,7 @@ def ablate(
 
     models = [read_predictions(path) for path in predictions or ()]
     with TerminalReporter(err) as reporter:
-        reporter.stage("reading pairs", rows_to_read(folder))
+        reporter.stage("reading rows and twins", rows_to_read(folder))
         found = ablate_dataset(folder, models, seed=seed, progress=reporter.advance)
     file = figures or folder / ABLATION_FILE
     write_anywhere(file, found.as_csv().encode())

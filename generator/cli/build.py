@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from generator import registries
-from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, plural, say
+from generator.cli.console import EXIT_INCOMPLETE, BlenderOption, JsonFlag, err, say
 from generator.cli.options import with_settings
 from generator.cli.reporter import JsonReporter, TerminalReporter
 from generator.errors import HeadturnError
@@ -23,6 +23,7 @@ from generator.heads.head import is_scene
 from generator.limits import MAX_WORKERS
 from generator.plan.config import BuildConfig, load_config
 from generator.plan.settings import Values, all_settings
+from generator.words import plural
 
 
 def build(
@@ -156,7 +157,7 @@ def compact(
             json.dumps({"dataset": str(target), "parts": count, "rows": rows, "digest": manifest.digest})
         )
     else:
-        say(f"{target}: {count} parts, {rows} rows, the same digest")
+        say(f"{target}: {plural(count, 'part')}, {plural(rows, 'row')}, the same digest")
 
 
 def register(app: typer.Typer) -> None:
@@ -195,6 +196,12 @@ def _print_result(result: Any, seconds: float, as_json: bool) -> None:
     ]
     if twins:
         lines.insert(2, f"twins     {plural(twins, 'twin')} of rows; headturn ablate compares them")
+    if manifest.configuration.get("dataset", {}).get("validation"):
+        rows = dict.fromkeys(("train", "validation"), 0)
+        for part in manifest.parts:
+            rows[part.path.split("/")[1]] += part.rows
+        said = ", ".join(f"{plural(count, 'row')} in {split}" for split, count in rows.items())
+        lines.insert(2, f"splits    {said}")
     if result.skipped:
         lines.append(f"left out  {plural(len(result.skipped), 'head')}: see {result.root / 'manifest.json'}")
     if result.failed_units:

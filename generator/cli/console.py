@@ -31,11 +31,6 @@ def shown(text: object) -> Text:
     return Text(printable(str(text)))
 
 
-def plural(count: int, noun: str) -> str:
-    """A number and its noun: "1 head", "2 heads"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 JsonFlag = Annotated[bool, typer.Option("--json", help="JSON on stdout, for machines.")]
 
 BlenderOption = Annotated[

@@ -13,6 +13,7 @@ import typer
 from generator.cli.console import JsonFlag, err, say
 from generator.cli.reporter import TerminalReporter
 from generator.registries import FORMATS
+from generator.words import plural
 
 _FORMATS = ", ".join(FORMATS)
 
@@ -75,13 +76,14 @@ def export(
         typer.echo(json.dumps({**asdict(done), "target": str(done.target)}))
         return
     landmarks_used = f", {done.landmarks} landmarks" if done.landmarks else ""
-    lines = [f"{done.rows} rows of {done.heads} heads as {done.format}{landmarks_used} in {done.target}"]
+    what = f"{plural(done.rows, 'row')} of {plural(done.heads, 'head')}"
+    lines = [f"{what} as {done.format}{landmarks_used} in {done.target}"]
     if done.filled:
-        lines.append(f"filled    {done.filled} rows with exact landmarks, each marked")
+        lines.append(f"filled    {plural(done.filled, 'row')} with exact landmarks, each marked")
     if done.left_out:
-        lines.append(f"left out  {done.left_out} rows without a detection or landmarks")
+        lines.append(f"left out  {plural(done.left_out, 'row')} without a detection or landmarks")
     if done.withheld:
-        lines.append(f"left out  {done.withheld} rows that may not be published")
+        lines.append(f"left out  {plural(done.withheld, 'row')} that may not be published")
     if chosen.note:
         lines.append(f"note      {chosen.note}")
     lines.append(f"read      {done.target / 'README.md'}")

@@ -16,6 +16,9 @@ from generator.cli.console import EXIT_INCOMPLETE, JsonFlag, err, out, say, show
 from generator.cli.reporter import TerminalReporter
 from generator.limits import MAX_WORKERS
 from generator.plan.settings import PARAMETRIC, Heads
+from generator.words import plural
+
+FOLDER = "Folder for the heads: new, empty, or of heads made here; those of the same names are made anew."
 
 heads_app = typer.Typer(help="Make heads, or look at a head source.", no_args_is_help=True)
 
@@ -24,7 +27,7 @@ heads_app = typer.Typer(help="Make heads, or look at a head source.", no_args_is
     "make", epilog="Example: headturn heads make --count 24 --seed 7 --expressions 3 --out heads"
 )
 def heads_make(
-    folder: Annotated[Path, typer.Option("--out", help="Folder for the heads; must be new or empty.")],
+    folder: Annotated[Path, typer.Option("--out", help=FOLDER)],
     count: Annotated[int, typer.Option(help="How many identities.")] = Heads.count,
     seed: Annotated[int, typer.Option(help="Same seed, same bytes.")] = Heads.seed,
     expressions: Annotated[
@@ -48,8 +51,7 @@ def heads_make(
         reporter.stage("making heads", count)
         made = maker.make(folder, wish, reporter.advance)
     command = f"headturn build --heads {shlex.quote(str(folder))} --out dataset"
-    heads = "1 head" if len(made.subjects) == 1 else f"{len(made.subjects)} heads"
-    say(f"{heads} in {folder}; build with: {command}")
+    say(f"{plural(len(made.subjects), 'head')} made in {folder}; build with: {command}")
 
 
 @heads_app.command("list", epilog="Example: headturn heads list /data/facescape")
@@ -77,9 +79,8 @@ def heads_list(
 
 
 def _print_heads(kind: str, path: Path, rows: list[dict[str, Any]]) -> None:
-    table = Table(
-        title=shown(f"{path}: {kind}, {len(rows)} heads"), box=None, pad_edge=False, title_justify="left"
-    )
+    title = shown(f"{path}: {kind}, {plural(len(rows), 'head')}")
+    table = Table(title=title, box=None, pad_edge=False, title_justify="left")
     columns = [c for c in (rows[0] if rows else {}) if c not in ("source", "path", "skipped")]
     for column in columns:
         table.add_column(column)

@@ -11,6 +11,7 @@ import typer
 
 from generator.cli.console import JsonFlag, err, say
 from generator.cli.reporter import TerminalReporter
+from generator.words import plural
 
 
 def upgrade(
@@ -38,7 +39,7 @@ def upgrade(
         typer.echo(json.dumps({**facts, "schema_version": now, "digest": done.manifest.digest}))
     elif done.changed:
         say(
-            f"{done.root}: schema {done.before} -> {now}, {done.manifest.rows} rows, "
+            f"{done.root}: schema {done.before} -> {now}, {plural(done.manifest.rows, 'row')}, "
             f"digest {done.manifest.digest}"
         )
     else:

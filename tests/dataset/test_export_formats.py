@@ -74,10 +74,11 @@ def test_nlml_hpe_as_its_code_looks_for_files(source, rows, tmp_path, suffix):
         assert sampled == {(1, 1)}, "colours are as fine as brightness"
 
 
-def test_facescape_ids_are_kept(tmp_path, build):
+@pytest.mark.parametrize("subjects", [("122", "340"), ("facescape-122", "facescape-340")])
+def test_facescape_ids_are_kept(tmp_path, build, subjects):
     from small_dataset import HEADS
 
-    heads = tuple(replace(head, subject=name) for head, name in zip(HEADS, ("122", "340"), strict=True))
+    heads = tuple(replace(head, subject=name) for head, name in zip(HEADS, subjects, strict=True))
     build(tmp_path / "d", heads=heads)
     export_dataset(tmp_path / "d", "nlml-hpe", tmp_path / "out")
     assert (tmp_path / "out" / "validation" / "340" / "ID340_(0_0_0).jpg").is_file()

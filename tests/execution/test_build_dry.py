@@ -268,3 +268,10 @@ def test_a_folder_that_is_something_else_is_refused(dry: DryBuild) -> None:
     with pytest.raises(DatasetError, match="not empty and not a Headturn dataset"):
         dry.build()
     assert [path.name for path in dry.root.iterdir()] == ["thesis.txt"]
+
+
+def test_a_compacted_dataset_is_not_called_something_else(dry: DryBuild) -> None:
+    dry.root.mkdir()
+    (dry.root / "manifest.json").write_text("{}")
+    with pytest.raises(DatasetError, match=r"without its config\.toml, as headturn compact writes them"):
+        dry.build()

@@ -15,6 +15,7 @@ from generator.dataset.export.source import Source
 from generator.dataset.export.tables import IMAGE, exported_schema, write_tables
 from generator.dataset.format.columns import ROWS as COLUMNS
 from generator.dataset.show.card import CARD_FILE
+from generator.words import plural
 
 CROISSANT_FILE = "croissant.json"
 FILES, ROWS = "parts", "rows"
@@ -89,9 +90,9 @@ def description(source: Source) -> dict[str, Any]:
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": "head-poses",
         "description": (
-            f"{source.rows} images of {len(source.heads)} heads with exact head pose, rendered in Blender. "
-            f"{publishable} of the heads may be published under their licence. Columns, signs and frames: "
-            "README.md."
+            f"{plural(source.rows, 'image')} of {plural(len(source.heads), 'head')} with exact head pose, "
+            f"rendered in Blender. {publishable} of the heads may be published under their licence. "
+            "Columns, signs and frames: README.md."
         ),
         "license": [_URLS.get(licence) or _named(licence) for licence in licences],
         "version": source.manifest.versions["headturn"],

@@ -17,6 +17,7 @@ from generator.dataset.format.columns import ROWS
 from generator.dataset.format.heads_table import HEADS_FILE
 from generator.dataset.show.card import CARD_FILE
 from generator.dataset.show.column_tables import column_rows, markdown_table
+from generator.words import plural
 
 _HUB_LICENCES = {
     "CC0-1.0": "cc0-1.0",
@@ -52,9 +53,9 @@ def card(source: Source, rows: Mapping[str, int], name: str) -> str:
     columns = column_rows(ROWS.values(), source.topology, lambda column: column.name in schema.names)
     rate = sum(p.detected for p in source.parts) / sum(p.rows for p in source.parts)
     summary = (
-        f"Images of {len(source.heads)} heads with exact head pose: {source.rows} rows, rendered in Blender "
-        f"at poses that are known, not measured. A detector found the face in {rate:.1%} of the rows read; "
-        "`detected` says in which."
+        f"Images of {plural(len(source.heads), 'head')} with exact head pose: "
+        f"{plural(source.rows, 'row')}, rendered in Blender at poses that are known, not measured. "
+        f"A detector found the face in {rate:.1%} of the rows read; `detected` says in which."
     )
     sections = [
         _front_matter(source, rows, schema),

@@ -14,8 +14,8 @@ ABOUT = """\
 `<split>/<id>/ID<id>_(<yaw>_<pitch>_<roll>).{suffix}`, whole degrees, as the published code of NLML-HPE looks
 for them: a folder a split, with images alone in it, since that code takes every name in it for the number of
 a head. Give `train` to `trainset_path` and `validation` to `valset_path`. `identities.csv` says which head
-each id is: the subject's own number where all subjects are numbers with one expression each, else counted
-from 1.
+each id is: the subject's own number where all subjects are numbers (122, facescape-122) with one expression
+each, else counted from 1.
 
 The pose in a name is R_C = Rx(-pitch) Ry(yaw) Rz(roll) in the camera frame. There are no landmarks here:
 the code runs its own detector, so an image on which ours found no face has an exact label all the same.

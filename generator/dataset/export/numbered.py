@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,18 +13,20 @@ from generator.escape import csv_text
 
 IDENTITIES_FILE = "identities.csv"
 
+_NUMBERED = re.compile(r"(?:facescape-)?(0|[1-9][0-9]{0,17})")
+"""A subject that is a number, or FaceScape's of one: those are called facescape-<id>."""
+
 
 def head_numbers(heads: Sequence[HeadRow], keep_numbers: bool) -> dict[tuple[str, str], int]:
     """A number from 1 on for every (subject, expression), in their order.
 
-    keep_numbers: where every subject is a number and has one expression, as in
-        FaceScape, that number is kept.
+    keep_numbers: where every subject is a number, or FaceScape's of a number, and has one expression,
+        that number is kept.
     """
     names = [(head.subject, head.expression) for head in heads]
-    subjects = [subject for subject, _ in names]
-    numeric = all(subject.isdecimal() and str(int(subject)) == subject for subject in subjects)
-    if keep_numbers and numeric and len(set(subjects)) == len(subjects):
-        return {name: int(name[0]) for name in names}
+    own = [int(found[1]) for subject, _ in names if (found := _NUMBERED.fullmatch(subject))]
+    if keep_numbers and len(set(own)) == len(names):
+        return dict(zip(names, own, strict=True))
     return {name: number for number, name in enumerate(names, start=1)}
 
 

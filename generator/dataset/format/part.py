@@ -160,7 +160,8 @@ def reading(path: Path) -> Iterator[None]:
         yield
     except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
         raise DatasetError(
-            f"{path}: not a readable part ({one_line(error)}); delete it and run `headturn build` again"
+            f"{path}: not a readable part ({one_line(error)}); delete it and run `headturn build` again, "
+            "or take it from a copy"
         ) from error
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from generator.dataset.show.detection import Cell
 from generator.escape import printable
+from generator.words import plural
 
 SHOWN = 3
 """How many of the same problem are named; the rest are counted."""
@@ -90,8 +91,8 @@ class Deep:
 
     def lines(self) -> list[str]:
         """For people."""
-        which = "all rows" if self.all_rows else f"{self.chosen} rows, chosen with seed {self.seed}"
-        seen = "no images are stored" if self.images == "none" else f"{self.decoded} images decoded"
+        which = "all rows" if self.all_rows else f"{plural(self.chosen, 'row')}, chosen with seed {self.seed}"
+        seen = "no images are stored" if self.images == "none" else f"{plural(self.decoded, 'image')} decoded"
         said = [f"{which}: {seen}, {self.rendered} rendered again and compared"]
         said += [f"  {count} not rendered again: {why}" for why, count in self.not_rendered.items()]
         if self.versions:
@@ -110,7 +111,7 @@ class Twins:
 
     def line(self) -> str:
         """For people."""
-        said = f"{self.rows} twins of rows, with {', '.join(self.factors) or 'nothing'} changed"
+        said = f"{plural(self.rows, 'twin')} of rows, with {', '.join(self.factors) or 'nothing'} changed"
         return said + f"; digest {self.digest}, Merkle root {self.merkle_root}" * bool(self.merkle_root)
 
 
@@ -164,7 +165,7 @@ class VerifyReport:
             lines.append(f"{NOT_CHECKED}: {', '.join(unchecked)}")
         if self.rows:
             lines.append(
-                f"{self.rows} rows of {self.heads} heads x {self.poses} poses; "
+                f"{plural(self.rows, 'row')} of {plural(self.heads, 'head')} x {plural(self.poses, 'pose')}; "
                 f"a face was found in {self.detection_rate:.1%}"
             )
         if self.twins is not None:
@@ -174,16 +175,17 @@ class VerifyReport:
         elif self.rows:
             if any(check.name == "exact landmarks" for check in self.checks):
                 lines.append(f"exact landmarks give R_C back to {self.closure_deg:.1g}°")
-            lines += [
+            worst = [
                 f"  yaw {cell.yaw_deg:+g}, pitch {cell.pitch_deg:+g}: {cell.rate:.0%} of {cell.rows}"
                 for cell in self.worst_cells
                 if cell.rate < 1
             ]
+            lines += ["a face was found least often at"] * bool(worst) + worst
         if self.deep is not None:
             lines += self.deep.lines()
         if not self.quick and self.ok:
             lines += [PROVED, *self._not_proved]
-        if self.digest:
+        if self.digest and self.rows:
             lines.append(f"digest {self.digest}, " + self._root_text)
         return "\n".join(map(printable, lines))
 

@@ -21,6 +21,7 @@ from generator.dataset.show.factors import factors_of
 from generator.escape import markdown, markdown_code
 from generator.landmarks.topology import FACE_MESH, Topology
 from generator.plan.factors import FACTORS
+from generator.words import plural
 
 CARD_FILE = "README.md"
 
@@ -61,7 +62,7 @@ def dataset_card(manifest: Manifest, heads: Sequence[HeadRow], topology: Topolog
         "embedded": "in the column image (bytes, path)",
     }[manifest.images]
     summary = (
-        f"{manifest.heads} heads, {manifest.rows} images, faces found in {rate} of them. "
+        f"{plural(manifest.heads, 'head')}, {plural(manifest.rows, 'image')}, faces found in {rate} of them. "
         f"Made with Headturn {markdown(manifest.versions['headturn'])}; "
         f"content digest {markdown_code(manifest.digest)}."
     )

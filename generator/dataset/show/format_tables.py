@@ -52,8 +52,8 @@ def factors_table() -> str:
     for factor in FACTORS.values():
         drawn = [f"`{key}` {text}" for key, text in {**factor.draws, **factor.along}.items() if text]
         others = [f"`{key}`" for key, text in factor.draws.items() if not text]
-        changes = f"; where the configuration draws it, {', '.join(others)}" if others else ""
-        rows.append((f"`{factor.name}`", factor.meaning, ", ".join(drawn) + changes))
+        where = [f"where the configuration draws it, {', '.join(others)}"] if others else []
+        rows.append((f"`{factor.name}`", factor.meaning, "; ".join([", ".join(drawn)] * bool(drawn) + where)))
     return markdown_table(("factor", "what changes", "drawn from"), rows)
 
 

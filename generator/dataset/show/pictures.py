@@ -180,12 +180,16 @@ def _row_name(head: HeadRow, poses: DatasetPoses, place: int, pose: int) -> str:
 
 
 def shown_poses(plan: PosePlan) -> list[int]:
-    """The poses of the plan nearest to the ends and the middle of its range, each once."""
+    """The poses of the plan nearest to the middle and the ends of its range: nine, or all of fewer."""
     low, high = plan.angles_deg.min(axis=0), plan.angles_deg.max(axis=0)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
     place = (plan.angles_deg - middle) / half
-    nearest = [int(((place - wanted) ** 2).sum(axis=1).argmin()) for wanted in SHEET_POSES]
-    return list(dict.fromkeys(nearest))
+    chosen: list[int] = []
+    for wanted in SHEET_POSES[: len(place)]:
+        distance = ((place - wanted) ** 2).sum(axis=1)
+        distance[chosen] = np.inf
+        chosen.append(int(distance.argmin()))
+    return chosen
 
 
 def _picture(dataset: Path, row: dict) -> Image.Image:

@@ -53,6 +53,11 @@ def claim(root: Path) -> None:
         ours = (root / CONFIG_FILE).is_file() or all(path.name == LOCK_FILE for path in root.iterdir())
     except OSError as error:
         raise DatasetError(f"{root}: cannot write there ({error.strerror}); choose another --out") from error
+    if not ours and (root / MANIFEST_FILE).is_file():
+        raise DatasetError(
+            f"{root} holds a dataset without its {CONFIG_FILE}, as headturn compact writes them; "
+            "continue the one that it was made from, or choose another --out"
+        )
     if not ours:
         raise DatasetError(f"{root} is not empty and not a Headturn dataset; choose another --out")
     for name in WRITTEN:

@@ -63,6 +63,7 @@ from generator.plan.config import BuildConfig, differences, recorded_config
 from generator.plan.first_settings import common_values
 from generator.plan.pose_plans import POSES_FILE, plan_poses, read_pose_plans, shared_plan
 from generator.plan.twins import twin_factors
+from generator.words import plural
 from generator.worn.things import check_things
 
 
@@ -171,7 +172,7 @@ def _build(
     gone = [part for part in stale if part not in earlier_parts(orders)]
     ask_to_drop(gone, root, confirm, changed_files(planned, root) if gone else ())
     if carried := carry_over(orders, root, receipts):
-        reporter.note(f"{carried} parts were taken over without being rendered again")
+        reporter.note(f"{plural(carried, 'part')} taken over without being rendered again")
     begin(config, root)
     drop(stale, root, heads, poses.plans, orders)
     write_poses(poses.plans, root)
