@@ -31,6 +31,7 @@ EXPRESSIONS = (
 
 LICENSE = "LicenseRef-FaceScape"
 ATTRIBUTION = "FaceScape, Nanjing University: non-commercial research only, no redistribution"
+OF_PUBLISHABLE = f"{ATTRIBUTION} but of rendered portraits of this subject"
 
 PUBLISHABLE_IDS = frozenset({122, 212, 340, 344, 393, 395, 421, 527, 594, 610})
 """Subjects whose rendered portraits may be published (publishable_list_v1.txt)."""
@@ -158,7 +159,7 @@ def _head(number: int, folder: Path, name: str, names: set[str]) -> Head | Skipp
         files=(mesh_path, texture),
         license=LICENSE,
         redistributable=number in PUBLISHABLE_IDS,
-        attribution=ATTRIBUTION,
+        attribution=OF_PUBLISHABLE if number in PUBLISHABLE_IDS else ATTRIBUTION,
         units="mm",
         up="+Y",
         forward="+Z",

@@ -32,6 +32,9 @@ def test_a_real_layout_gives_subjects_licence_and_skipped_files(download: Path) 
         "facescape-360/neutral",
     ]
     assert [head.redistributable for head in source.heads] == [False, False, True, False]
+    assert ["portraits of this subject" in head.attribution for head in source.heads] == [
+        head.redistributable for head in source.heads
+    ]
     assert all(
         (h.license, h.units, h.up, h.forward) == ("LicenseRef-FaceScape", "mm", "+Y", "+Z")
         for h in source.heads
