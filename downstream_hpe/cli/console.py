@@ -83,5 +83,6 @@ def one_line_errors() -> Iterator[None]:
         note(f"downstream-hpe: {error}")
         sys.exit(1)
     except KeyboardInterrupt:
-        note("downstream-hpe: stopped; run the same command again to continue")
+        further = "; run the same command again to continue" if sys.argv[1:2] == ["fit"] else ""
+        note(f"downstream-hpe: stopped{further}")
         sys.exit(130)

@@ -30,7 +30,8 @@ def _run() -> None:
             main()
     except Stopped as stopped:
         # Without rich, whose import may be what was stopped.
-        sys.stderr.write(f"headturn: {stopped}; run the same command again to continue\n")
+        further = "; run the same command again to continue" if sys.argv[1:2] == ["build"] else ""
+        sys.stderr.write(f"headturn: {stopped}{further}\n")
         sys.exit(stopped.exit_code)
     except ImportError as error:
         from litert_faces.installing import numpy_clash
