@@ -16,6 +16,13 @@ from generator.blender.scene_strands import show_rendered_strands
 from generator.errors import HeadError
 from generator.escape import quoted
 
+_KEPT = (
+    *("hide_render", "pass_index", "color", "is_holdout", "is_shadow_catcher"),
+    *("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission"),
+    *("visible_volume_scatter", "visible_shadow"),
+)
+"""Of an object that becomes a mesh."""
+
 TURNED = 1e-5
 """How far a vertex may be from where the head's turn takes it, of its distance from the world's origin."""
 
@@ -86,8 +93,14 @@ class SceneHead:
             one if data is None else _with_data(self.scene, one, data)
             for one, data in zip(local, frozen, strict=True)
         ]
-        for one, world in zip(self.objects, worlds, strict=True):
-            _hang(one, world, self._pivot)
+        placed = dict(zip(self.objects, worlds, strict=True))
+        for one, world in placed.items():
+            above = one.parent
+            if above in placed and above.instance_type in ("VERTS", "FACES"):
+                # It draws its children, so they have to stay that.
+                _hang(one, placed[above].inverted_safe() @ world, above)
+            else:
+                _hang(one, world, self._pivot)
         bpy.context.view_layer.update()
         self._surfaces = placed_surfaces({*self.objects})
 
@@ -111,6 +124,7 @@ def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
     """Have what Python can ask for, which is the viewport's, be what is rendered."""
     for one in bpy.data.objects:
         one.hide_viewport = one.hide_render
+        one.show_instancer_for_viewport = one.show_instancer_for_render
         for modifier in one.modifiers:
             modifier.show_viewport = modifier.show_render
             if modifier.type == "SUBSURF":
@@ -119,6 +133,12 @@ def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
                 modifier.levels = min(modifier.render_levels, modifier.total_levels)
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
+    for ball in bpy.data.metaballs:
+        ball.resolution = ball.render_resolution
+    for curve in bpy.data.curves:
+        for one in (curve, *curve.splines):
+            one.resolution_u = curve.render_resolution_u or one.resolution_u
+            one.resolution_v = curve.render_resolution_v or one.resolution_v
     show_rendered_strands()
     scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
     scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
@@ -184,9 +204,12 @@ def _frozen(
     there: bpy.types.Object, draws_others: bool, graph: bpy.types.Depsgraph
 ) -> bpy.types.Mesh | bpy.types.Curves | None:
     """What an evaluated object is, as data of its own; None where it is that already, or is not all of it."""
+    # Nodes may make meshes and instances of hair. A metaball draws its surface as if it were another's.
+    if there.type != "META" and (draws_others or there.particle_systems):
+        return None
     if there.type == "CURVES":
         return there.data.copy()
-    if there.type not in SURFACES or draws_others or there.particle_systems:
+    if there.type not in SURFACES:
         return None
     return bpy.data.meshes.new_from_object(there, preserve_all_data_layers=True, depsgraph=graph)
 
@@ -198,19 +221,20 @@ def _with_data(scene: bpy.types.Scene, one: bpy.types.Object, data: bpy.types.ID
         one.data = data
         return one
     made = bpy.data.objects.new(one.name, data)
-    scene.collection.objects.link(made)
-    for key in ("hide_render", "pass_index", "visible_camera", "visible_shadow", "color"):
+    for collection in one.users_collection or (scene.collection,):
+        (scene.collection if collection.library is not None else collection).objects.link(made)
+    for key in _KEPT:
         setattr(made, key, getattr(one, key))
     one.hide_render = one.hide_viewport = True
     return made
 
 
-def _hang(one: bpy.types.Object, world: Matrix, pivot: bpy.types.Object) -> None:
-    """Have an object stay where it is before the pivot, and follow that alone."""
+def _hang(one: bpy.types.Object, place: Matrix, above: bpy.types.Object) -> None:
+    """Have an object stand at a place before another one, and follow that alone."""
     one.constraints.clear()
     one.animation_data_clear()
-    one.parent, one.parent_type = pivot, "OBJECT"
+    one.parent, one.parent_type = above, "OBJECT"
     one.delta_location, one.delta_scale = (0, 0, 0), (1, 1, 1)
     one.delta_rotation_euler, one.delta_rotation_quaternion = (0, 0, 0), (1, 0, 0, 0)
     one.matrix_basis = Matrix.Identity(4)
-    one.matrix_parent_inverse = world
+    one.matrix_parent_inverse = place

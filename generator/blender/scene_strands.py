@@ -36,7 +36,7 @@ def strands(owners: Collection[bpy.types.Object]) -> HeadMesh | None:
     for instance in graph.object_instances:
         here = instance.object
         owner = (instance.parent if instance.is_instance else here).original
-        if owner not in owners or not here.visible_camera:
+        if owner not in owners or not (here.visible_camera and owner.visible_camera):
             continue
         world = np.array(instance.matrix_world, dtype=np.float64)
         found = [*_particles(here, world)] if instance.show_particles else []
@@ -52,6 +52,20 @@ def strands(owners: Collection[bpy.types.Object]) -> HeadMesh | None:
     every = np.concatenate(triangles).astype(np.int32)
     return HeadMesh(
         np.concatenate(vertices), every, None, None, np.zeros(len(every), np.int32), (Material("hair"),)
+    )
+
+
+def both(hair: HeadMesh | None, cut: HeadMesh | None) -> HeadMesh | None:
+    """The hair of a head, and what of the head is cut out of the picture: either hides what is behind."""
+    if hair is None or cut is None:
+        return cut if hair is None else hair
+    return HeadMesh(
+        np.concatenate([cut.vertices, hair.vertices]),
+        np.concatenate([cut.triangles, hair.triangles + len(cut.vertices)]),
+        None,
+        None,
+        np.zeros(len(cut.triangles) + len(hair.triangles), np.int32),
+        hair.materials,
     )
 
 

@@ -188,9 +188,8 @@ def _measure(
         is_kept[mesh.triangles[kept]] = True
         radius = round(float(reach[is_head & is_kept].max()) * scale, 2)
         kept = surroundings(mesh, in_source_axes, radius / scale)
-        notes.append(
-            f"{(~kept).sum()} of {len(kept)} triangles are left out: they lie apart from this face's head"
-        )
+        what = "are left out" if mesh.scene is None else "are rendered and bear no landmark"
+        notes.append(f"{(~kept).sum()} of {len(kept)} triangles {what}: they lie apart from this face's head")
     return Placement(
         units=units,
         mm_per_unit=scale,
@@ -202,7 +201,7 @@ def _measure(
         notes=tuple(notes),
         turned_deg=turned_deg or (0.0, 0.0, 0.0),
         scene_camera=mesh.scene.seen_pivot(in_source_axes, scale) if mesh.scene else None,
-        no_camera=mesh.scene.no_camera if mesh.scene else "",
+        no_camera=mesh.scene.why_no_camera(in_source_axes, scale, radius) if mesh.scene else "",
     )
 
 

@@ -43,6 +43,7 @@ def test_the_head_is_the_one_named_or_tagged_or_the_only_one(said: dict[str, Any
     assert heads["tagged"] == "Anna"
     assert heads["alone"] == "Rig"
     assert heads["collection"] == "Head"
+    assert heads["left out"] == "Anna"
     assert said["two"]["error"] == f"{WHICH}; there are: 'Anna', 'Floor'"
     assert (
         said["two-misnamed"]["error"]
@@ -104,6 +105,27 @@ def test_a_material_of_the_head_moves_no_surface(folder: Path) -> None:
     assert turned["problems"] == [
         "'Skin': displacement is rendered as bump, so that labels are where the surface is"
     ]
+
+
+@pytest.mark.slow
+def test_a_frozen_head_looks_as_blender_renders_it(folder: Path) -> None:
+    """At the frame of the file, with what nodes make of hair, what vertices carry, and metaballs."""
+    for name, seen in json.loads((folder / "looks.json").read_text()).items():
+        assert seen["shown"] > 0.01 and seen["off"] < 0.05, (name, seen)
+
+
+@pytest.mark.slow
+def test_what_one_sees_through_hides_nothing(folder: Path) -> None:
+    said = json.loads((folder / "through.json").read_text())
+    parts = {name: tuple(one["parts"]) for name, one in said.items()}
+    seen, cut = ("seen", "all"), ("cut", "all")
+    assert parts == {
+        **dict.fromkeys(("solid", "solid group", "card", "one side"), seen),
+        **dict.fromkeys(("glass", "clear group", "nearly clear", "no alpha", "fog", "indirect layer"), ()),
+        **dict.fromkeys(("holdout", "holdout shader", "holdout layer"), cut),
+    }
+    assert [name for name, one in said.items() if one["cutout"]] == ["card"]
+    assert [name for name, one in said.items() if one["unknown"]] == ["one side"]
 
 
 @pytest.mark.slow
