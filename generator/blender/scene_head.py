@@ -173,14 +173,19 @@ def _set_shape_key(objects: Sequence[bpy.types.Object], name: str) -> bool:
 
 
 def _frame(objects: Sequence[bpy.types.Object]) -> Matrix:
-    """The head's own axes and origin in the world: those of its topmost object, or the world's of several."""
+    """The head's own axes and origin in the world: those of its topmost object, or the world's of several.
+
+    Of one that is mirrored y and z are its own, and x is not: faces are alike from left to right.
+    """
     inside = {*objects}
     roots = [one for one in objects if one.parent not in inside]
     if len(roots) != 1:
         return Matrix.Identity(4)
     graph = bpy.context.evaluated_depsgraph_get()
-    place, turn, _ = roots[0].evaluated_get(graph).matrix_world.decompose()
-    return Matrix.Translation(place) @ turn.to_matrix().to_4x4()
+    world = roots[0].evaluated_get(graph).matrix_world
+    place, turn, _ = world.decompose()
+    mirrored = Matrix.Diagonal((1, -1, -1, 1)) if world.is_negative else Matrix.Identity(4)
+    return Matrix.Translation(place) @ turn.to_matrix().to_4x4() @ mirrored
 
 
 def _flatten(objects: Sequence[bpy.types.Object]) -> list[str]:

@@ -22,6 +22,9 @@ from generator.heads.package import save_package
 from generator.heads.scene import BlendScene, Numbers
 from generator.messages import SceneOrder
 
+COARSE = 1e-3
+"""Of a head's size, the steps in which Blender places it: more than that is said."""
+
 
 def read_scene(order: SceneOrder) -> None:
     """Carry out an order. Raises HeadError: the .blend cannot be opened, or has no such head."""
@@ -42,7 +45,7 @@ def read_scene(order: SceneOrder) -> None:
         return str(file)
 
     surfaces, rest = placed_surfaces(ours), placed_surfaces(ours, others=True)
-    head.problems += [*unknown_shading([*surfaces, *rest]), *_unlabelled(ours)]
+    head.problems += [*unknown_shading([*surfaces, *rest]), *_unlabelled(ours), *_coarse(surfaces)]
     mesh = joined(surfaces, _folder(target, "scene-textures"))
     if mesh is None:
         raise HeadError("the head has no surface that is rendered and that one cannot see through")
@@ -81,6 +84,18 @@ def _unlabelled(ours: Collection[bpy.types.Object]) -> Iterator[str]:
             names[owner.name] = None
     if names:
         yield f"{listed(names)}: points, and hair that is not the head's, hide no landmark for labels"
+
+
+def _coarse(surfaces: Sequence[Surface]) -> Iterator[str]:
+    """Far from the world's origin Blender's 32 bits tell no near points apart."""
+    points = np.concatenate([one.vertices for one in surfaces] or [np.zeros((1, 3))])
+    far = np.abs(points).max()
+    step, size = np.spacing(np.float32(far)), np.ptp(points, axis=0).max()
+    if step > COARSE * size:
+        yield (
+            f"it stands {far:.3g} units from the world's origin, where Blender tells points apart by "
+            f"{step:.2g}, {100 * step / size:.1g} % of the head; move the scene to the origin"
+        )
 
 
 def _rest(head: SceneHead, surfaces: Sequence[Surface], textures: Path) -> HeadMesh | None:

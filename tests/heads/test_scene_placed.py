@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from generator.geometry.camera import Camera
 from generator.geometry.scene_camera import SceneCamera
+from generator.heads.head import SCENE as SCENE_SOURCE
+from generator.heads.head import Head
 from generator.heads.mesh import HeadMesh, Material
 from generator.heads.placement import Placement
 from generator.heads.scene import BlendScene
 from generator.heads.surroundings import head_alone
 from generator.landmarks.surface import Surface
+from generator.placing import face
 
 TO_WORLD = tuple(np.eye(4).reshape(-1).tolist())
 CAMERA = SceneCamera(50.0, 36.0, 24.0, 0, 0.0, 0.0, 1.0, 64, 64)
@@ -61,6 +67,21 @@ def test_what_lies_apart_from_the_head_is_rendered_in_a_scene_and_hides() -> Non
     placement = Placement("mm", 1.0, "+Y", "+Z", (0.0, 0.0, 0.0), 100.0, 60.0)
     assert len(head_alone(mesh, placement).triangles) == 28
     assert head_alone(replace(mesh, scene=SCENE), placement).triangles.tolist() == mesh.triangles.tolist()
+
+
+def test_a_head_of_an_imported_file_has_the_axes_of_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[tuple[str, str]] = []
+
+    def straight(*given: Any) -> str | None:
+        tried.append(given[3])
+        return "placed" if given[3] == ("+Y", "+Z") else None
+
+    monkeypatch.setattr(face, "_straight", straight)
+    monkeypatch.setattr(face, "find_around", lambda *_: [])
+    mesh = _mesh(np.eye(3), np.array([[0, 1, 2]]))
+    file = Path("a.blend")
+    assert face.find_face(Head("a", "neutral", SCENE_SOURCE, file, (file,)), mesh, None) == "placed"  # type: ignore[arg-type, comparison-overlap]
+    assert tried == [("+Z", "-Y"), ("+Y", "+Z")]
 
 
 def _mesh(vertices: np.ndarray, triangles: np.ndarray) -> HeadMesh:

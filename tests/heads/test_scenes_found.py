@@ -94,8 +94,10 @@ def test_heads_turn_as_one_or_are_refused(folder: Path) -> None:
         "'Lid' does not turn with the head: something else holds it; apply its modifiers, or parent what "
         "holds it to the head"
     )
-    for name in ("held_inside", "displaced", "linked", "instanced"):
+    for name in ("held_inside", "displaced", "linked", "instanced", "mirrored"):
         assert turned[name]["error"] == "" and turned[name]["off"] < 1e-5, (name, turned[name])
+    # Of a mirrored one up is up, and forward is forward, or no face is found.
+    assert turned["mirrored"]["axes"] == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
 
 @pytest.mark.slow
