@@ -2,7 +2,7 @@
 """Scenes of every kind, and what is said of each, in one process: ``python many_scenes.py FOLDER``.
 
 FOLDER/said.json has an answer of generator.blender.describe a scene, FOLDER/turned.json what frozen_scenes.py
-says, FOLDER/hair.json what haired_scenes.py does, FOLDER/looks.json and through.json what
+says, FOLDER/hair.json what haired_scenes.py does, FOLDER/looks.json, order.json and through.json what
 rendered_scenes.py does; FOLDER/cameras.json has Blender's own projection
 matrices of some cameras.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 from frozen_scenes import how_they_turn
 from haired_scenes import how_hair_is_seen
-from rendered_scenes import how_they_look, what_one_sees_through
+from rendered_scenes import how_they_look, what_one_sees_through, whether_order_matters
 
 from generator.blender import outside
 from generator.blender.describe import main as describe
@@ -186,6 +186,7 @@ def main(folder: Path) -> None:
     (folder / "turned.json").write_text(json.dumps(how_they_turn(folder)))
     (folder / "hair.json").write_text(json.dumps(how_hair_is_seen(folder)))
     (folder / "looks.json").write_text(json.dumps(how_they_look(folder)))
+    (folder / "order.json").write_text(json.dumps(whether_order_matters(folder)))
     (folder / "through.json").write_text(json.dumps(what_one_sees_through(folder)))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     file = scattered(folder)

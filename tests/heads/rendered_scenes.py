@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,10 @@ import bpy
 import numpy as np
 
 from generator.blender.scene_head import SceneHead
+from generator.blender.scene_images import SceneImages
 from generator.blender.scene_mesh import ALL, CUT, SEEN, joined, placed_surfaces, unknown_shading
 from generator.blender.still import render_still
+from generator.heads.scene import BlendScene
 
 SIDE = 24
 
@@ -43,6 +45,33 @@ def what_one_sees_through(folder: Path) -> dict[str, dict[str, Any]]:
             "unknown": bool(unknown_shading(surfaces)),
         }
     return said
+
+
+def whether_order_matters(folder: Path) -> dict[str, float]:
+    """A head with hair of particles, seen after another pose and by itself; as of how_they_look."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    head = _thing("Head")
+    head.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    hair = head.particle_systems[0].settings
+    hair.type, hair.count, hair.hair_length, hair.radius_scale = "HAIR", 400, 0.5, 0.02
+    _lit(bpy.context.scene)
+    file = folder / "order.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    first, last = (_turned_to(file, angles) for angles in ((0.4, -0.9), (-0.9,)))
+    return {"off": float(np.abs(first - last).max()), "shown": float(last.mean())}
+
+
+def _turned_to(file: Path, angles: Sequence[float]) -> np.ndarray:
+    images = SceneImages(BlendScene(str(file), "Head", "", tuple(np.eye(4).reshape(-1).tolist())), threads=1)
+    camera, scene = images._camera, images._scene
+    camera.location, camera.rotation_euler = (0.4, -3.0, 0.4), (np.pi / 2, 0, 0)
+    scene.render.image_settings.file_format = "BMP"
+    scene.render.filepath = str(file.with_suffix(".bmp"))
+    for angle in angles:
+        c, s = np.cos(angle), np.sin(angle)
+        images._head.turn(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([0.3, 0.7, 0.0]))
+        render_still()
+    return _pixels(file.with_suffix(".bmp"))
 
 
 def animated() -> None:
@@ -96,15 +125,7 @@ def _looks(make: Callable[[], None], folder: Path) -> dict[str, Any]:
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 3.0
     scene.camera.location, scene.camera.rotation_euler = (0.4, -5.0, 0.4), (np.pi / 2, 0, 0)
     scene.collection.objects.link(scene.camera)
-    scene.world = bpy.data.worlds.new("World")
-    scene.world.color = (0.0, 0.0, 0.0)
-    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
-    lamp.rotation_euler = (1.0, 0.3, 0)
-    scene.collection.objects.link(lamp)
-    scene.render.engine = "CYCLES"
-    scene.cycles.samples, scene.cycles.use_denoising = 1, False
-    scene.render.resolution_x = scene.render.resolution_y = SIDE
-    scene.render.image_settings.file_format = "BMP"
+    _lit(scene)
     file = folder / f"looks_{make.__name__}.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.context.scene.render.filepath = str(file.with_suffix(".bmp"))
@@ -116,6 +137,19 @@ def _looks(make: Callable[[], None], folder: Path) -> dict[str, Any]:
     head.scene.render.filepath = str(file.with_suffix(".bmp"))
     render_still()
     return {"off": float(np.abs(_pixels(file.with_suffix(".bmp")) - own).max()), "shown": float(own.mean())}
+
+
+def _lit(scene: bpy.types.Scene) -> None:
+    """Lit, and with what a small picture needs."""
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.0, 0.0, 0.0)
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+    lamp.rotation_euler = (1.0, 0.3, 0)
+    scene.collection.objects.link(lamp)
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    scene.render.resolution_x = scene.render.resolution_y = SIDE
+    scene.render.image_settings.file_format = "BMP"
 
 
 def _pixels(file: Path) -> np.ndarray:

@@ -117,6 +117,12 @@ def test_a_frozen_head_looks_as_blender_renders_it(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_hair_of_particles_looks_alike_whatever_was_rendered_before(folder: Path) -> None:
+    order = json.loads((folder / "order.json").read_text())
+    assert order["shown"] > 0.01 and order["off"] == 0, order
+
+
+@pytest.mark.slow
 def test_what_one_sees_through_hides_nothing(folder: Path) -> None:
     said = json.loads((folder / "through.json").read_text())
     parts = {name: tuple(one["parts"]) for name, one in said.items()}
