@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector
 
 from generator.blender.scene_file import SURFACES, find_head, objects_of, open_scene
 from generator.blender.scene_mesh import placed_surfaces
-from generator.blender.scene_strands import show_rendered_strands
+from generator.blender.scene_strands import rest_dynamics, show_rendered_strands
 from generator.errors import HeadError
 from generator.escape import quoted
 
@@ -47,6 +47,7 @@ class SceneHead:
                 f"the scene is set to {engine}, which needs a graphics card; it is rendered with Cycles"
             )
         _show_what_is_rendered(self.scene)
+        self.problems += rest_dynamics()
         thing = find_head(head_object)
         self.objects = objects_of(thing)
         if shape_key and not _set_shape_key(self.objects, shape_key):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from generator.blender.scene_file import listed
 from generator.heads.mesh import HeadMesh, Material
 
 SIDES = 4
@@ -75,6 +76,20 @@ def show_rendered_strands() -> None:
         settings.display_percentage = 100
         settings.child_percent = settings.rendered_child_count
         settings.display_step = settings.render_step
+
+
+def rest_dynamics() -> list[str]:
+    """Have hair that would be simulated anew, and otherwise for each picture, stand as it was groomed."""
+    found = [
+        (one, system)
+        for one in bpy.data.objects
+        for system in one.particle_systems
+        if system.use_hair_dynamics and not (system.point_cache and system.point_cache.is_baked)
+    ]
+    for _, system in found:
+        system.use_hair_dynamics = False
+    said = "hair dynamics that are not baked are off; bake them in Blender"
+    return [f"{listed(dict.fromkeys(one.name for one, _ in found))}: {said}"] if found else []
 
 
 def _curves(data: bpy.types.Curves, world: np.ndarray) -> Strands:

@@ -23,7 +23,7 @@ def how_they_turn(folder: Path) -> dict[str, dict[str, Any]]:
     off: how far its surfaces are from where they should be. methods: of displacement, by material.
     axes: of the head, a row an axis of the world.
     """
-    scenes = displaced, held, held_inside, linked, instanced, mirrored
+    scenes = displaced, held, held_inside, linked, instanced, mirrored, simulated
     return {make.__name__: _turned(make, folder) for make in scenes}
 
 
@@ -77,6 +77,14 @@ def instanced(folder: Path) -> None:
 def mirrored(_: Path) -> None:
     head = _thing("Head")
     head.scale, head.rotation_euler = (-0.5, 1.0, 2.0), (0.0, 0.0, np.pi / 2)
+
+
+def simulated(_: Path) -> None:
+    head = _thing("Head")
+    head.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    head.particle_systems[0].settings.type = "HAIR"
+    head.particle_systems[0].settings.count = 3
+    head.particle_systems[0].use_hair_dynamics = True
 
 
 def _turned(make: Any, folder: Path) -> dict[str, Any]:

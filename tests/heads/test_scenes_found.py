@@ -96,6 +96,9 @@ def test_heads_turn_as_one_or_are_refused(folder: Path) -> None:
     )
     for name in ("held_inside", "displaced", "linked", "instanced", "mirrored"):
         assert turned[name]["error"] == "" and turned[name]["off"] < 1e-5, (name, turned[name])
+    assert turned["simulated"]["problems"] == [
+        "'Head': hair dynamics that are not baked are off; bake them in Blender"
+    ]
     # Of a mirrored one up is up, and forward is forward, or no face is found.
     assert turned["mirrored"]["axes"] == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
