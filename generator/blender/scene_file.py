@@ -117,12 +117,24 @@ def listed(names: Iterable[str]) -> str:
 
 def _candidates() -> Iterator[bpy.types.Object]:
     """Objects without a parent that are rendered, or carry something that is, as a surface."""
-    there = {*bpy.context.scene.objects}
+    there, drawn = {*bpy.context.scene.objects}, _drawn()
     for one in bpy.context.scene.objects:
         if one.parent in there:
             continue
-        if any(part.type in SURFACES and not part.hide_render for part in (one, *one.children_recursive)):
+        if any(part.type in SURFACES and part in drawn for part in (one, *one.children_recursive)):
             yield one
+
+
+def _drawn() -> set[bpy.types.Object]:
+    """What is rendered of the scene, and in no collection that is left out."""
+    waiting, found = [bpy.context.view_layer.layer_collection], set()
+    while waiting:
+        here = waiting.pop()
+        if not here.collection.hide_render:
+            waiting += here.children
+            if not here.exclude:
+                found |= {one for one in here.collection.objects if not one.hide_render}
+    return found
 
 
 def _could_be() -> str:

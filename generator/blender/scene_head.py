@@ -12,9 +12,16 @@ from mathutils import Matrix, Vector
 
 from generator.blender.scene_file import SURFACES, find_head, objects_of, open_scene
 from generator.blender.scene_mesh import placed_surfaces
-from generator.blender.scene_strands import show_rendered_strands
+from generator.blender.scene_strands import rest_dynamics, show_rendered_strands
 from generator.errors import HeadError
 from generator.escape import quoted
+
+_KEPT = (
+    *("hide_render", "pass_index", "color", "is_holdout", "is_shadow_catcher"),
+    *("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission"),
+    *("visible_volume_scatter", "visible_shadow"),
+)
+"""Of an object that becomes a mesh."""
 
 TURNED = 1e-5
 """How far a vertex may be from where the head's turn takes it, of its distance from the world's origin."""
@@ -40,6 +47,7 @@ class SceneHead:
                 f"the scene is set to {engine}, which needs a graphics card; it is rendered with Cycles"
             )
         _show_what_is_rendered(self.scene)
+        self.problems += rest_dynamics()
         thing = find_head(head_object)
         self.objects = objects_of(thing)
         if shape_key and not _set_shape_key(self.objects, shape_key):
@@ -86,8 +94,14 @@ class SceneHead:
             one if data is None else _with_data(self.scene, one, data)
             for one, data in zip(local, frozen, strict=True)
         ]
-        for one, world in zip(self.objects, worlds, strict=True):
-            _hang(one, world, self._pivot)
+        placed = dict(zip(self.objects, worlds, strict=True))
+        for one, world in placed.items():
+            above = one.parent
+            if above in placed and above.instance_type in ("VERTS", "FACES"):
+                # It draws its children, so they have to stay that.
+                _hang(one, placed[above].inverted_safe() @ world, above)
+            else:
+                _hang(one, world, self._pivot)
         bpy.context.view_layer.update()
         self._surfaces = placed_surfaces({*self.objects})
 
@@ -111,6 +125,7 @@ def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
     """Have what Python can ask for, which is the viewport's, be what is rendered."""
     for one in bpy.data.objects:
         one.hide_viewport = one.hide_render
+        one.show_instancer_for_viewport = one.show_instancer_for_render
         for modifier in one.modifiers:
             modifier.show_viewport = modifier.show_render
             if modifier.type == "SUBSURF":
@@ -119,6 +134,12 @@ def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
                 modifier.levels = min(modifier.render_levels, modifier.total_levels)
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
+    for ball in bpy.data.metaballs:
+        ball.resolution = ball.render_resolution
+    for curve in bpy.data.curves:
+        for one in (curve, *curve.splines):
+            one.resolution_u = curve.render_resolution_u or one.resolution_u
+            one.resolution_v = curve.render_resolution_v or one.resolution_v
     show_rendered_strands()
     scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
     scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
@@ -153,14 +174,19 @@ def _set_shape_key(objects: Sequence[bpy.types.Object], name: str) -> bool:
 
 
 def _frame(objects: Sequence[bpy.types.Object]) -> Matrix:
-    """The head's own axes and origin in the world: those of its topmost object, or the world's of several."""
+    """The head's own axes and origin in the world: those of its topmost object, or the world's of several.
+
+    Of one that is mirrored y and z are its own, and x is not: faces are alike from left to right.
+    """
     inside = {*objects}
     roots = [one for one in objects if one.parent not in inside]
     if len(roots) != 1:
         return Matrix.Identity(4)
     graph = bpy.context.evaluated_depsgraph_get()
-    place, turn, _ = roots[0].evaluated_get(graph).matrix_world.decompose()
-    return Matrix.Translation(place) @ turn.to_matrix().to_4x4()
+    world = roots[0].evaluated_get(graph).matrix_world
+    place, turn, _ = world.decompose()
+    mirrored = Matrix.Diagonal((1, -1, -1, 1)) if world.is_negative else Matrix.Identity(4)
+    return Matrix.Translation(place) @ turn.to_matrix().to_4x4() @ mirrored
 
 
 def _flatten(objects: Sequence[bpy.types.Object]) -> list[str]:
@@ -184,9 +210,12 @@ def _frozen(
     there: bpy.types.Object, draws_others: bool, graph: bpy.types.Depsgraph
 ) -> bpy.types.Mesh | bpy.types.Curves | None:
     """What an evaluated object is, as data of its own; None where it is that already, or is not all of it."""
+    # Nodes may make meshes and instances of hair. A metaball draws its surface as if it were another's.
+    if there.type != "META" and (draws_others or there.particle_systems):
+        return None
     if there.type == "CURVES":
         return there.data.copy()
-    if there.type not in SURFACES or draws_others or there.particle_systems:
+    if there.type not in SURFACES:
         return None
     return bpy.data.meshes.new_from_object(there, preserve_all_data_layers=True, depsgraph=graph)
 
@@ -198,19 +227,20 @@ def _with_data(scene: bpy.types.Scene, one: bpy.types.Object, data: bpy.types.ID
         one.data = data
         return one
     made = bpy.data.objects.new(one.name, data)
-    scene.collection.objects.link(made)
-    for key in ("hide_render", "pass_index", "visible_camera", "visible_shadow", "color"):
+    for collection in one.users_collection or (scene.collection,):
+        (scene.collection if collection.library is not None else collection).objects.link(made)
+    for key in _KEPT:
         setattr(made, key, getattr(one, key))
     one.hide_render = one.hide_viewport = True
     return made
 
 
-def _hang(one: bpy.types.Object, world: Matrix, pivot: bpy.types.Object) -> None:
-    """Have an object stay where it is before the pivot, and follow that alone."""
+def _hang(one: bpy.types.Object, place: Matrix, above: bpy.types.Object) -> None:
+    """Have an object stand at a place before another one, and follow that alone."""
     one.constraints.clear()
     one.animation_data_clear()
-    one.parent, one.parent_type = pivot, "OBJECT"
+    one.parent, one.parent_type = above, "OBJECT"
     one.delta_location, one.delta_scale = (0, 0, 0), (1, 1, 1)
     one.delta_rotation_euler, one.delta_rotation_quaternion = (0, 0, 0), (1, 0, 0, 0)
     one.matrix_basis = Matrix.Identity(4)
-    one.matrix_parent_inverse = world
+    one.matrix_parent_inverse = place

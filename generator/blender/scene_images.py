@@ -53,6 +53,9 @@ class SceneImages:
         self._aspect = self._scene.render.pixel_aspect_x, self._scene.render.pixel_aspect_y
         self._scene.camera = self._camera
         _settle(self._scene, threads)
+        # Cycles keeps strands of particles as they stand first, and their rounding would be in all pictures.
+        if any(one.particle_systems for one in (*self._head.objects, *self._head.instanced())):
+            self._scene.render.use_persistent_data = False
         (device or Device()).use(self._scene)
 
     def wear(self, packages: Iterable[str]) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from generator.blender.scene_file import listed
 from generator.heads.mesh import HeadMesh, Material
 
 SIDES = 4
@@ -36,7 +37,7 @@ def strands(owners: Collection[bpy.types.Object]) -> HeadMesh | None:
     for instance in graph.object_instances:
         here = instance.object
         owner = (instance.parent if instance.is_instance else here).original
-        if owner not in owners or not here.visible_camera:
+        if owner not in owners or not (here.visible_camera and owner.visible_camera):
             continue
         world = np.array(instance.matrix_world, dtype=np.float64)
         found = [*_particles(here, world)] if instance.show_particles else []
@@ -55,12 +56,40 @@ def strands(owners: Collection[bpy.types.Object]) -> HeadMesh | None:
     )
 
 
+def both(hair: HeadMesh | None, cut: HeadMesh | None) -> HeadMesh | None:
+    """The hair of a head, and what of the head is cut out of the picture: either hides what is behind."""
+    if hair is None or cut is None:
+        return cut if hair is None else hair
+    return HeadMesh(
+        np.concatenate([cut.vertices, hair.vertices]),
+        np.concatenate([cut.triangles, hair.triangles + len(cut.vertices)]),
+        None,
+        None,
+        np.zeros(len(cut.triangles) + len(hair.triangles), np.int32),
+        hair.materials,
+    )
+
+
 def show_rendered_strands() -> None:
     """Have the strands of particle systems that Python can ask for be those that are rendered."""
     for settings in bpy.data.particles:
         settings.display_percentage = 100
         settings.child_percent = settings.rendered_child_count
         settings.display_step = settings.render_step
+
+
+def rest_dynamics() -> list[str]:
+    """Have hair that would be simulated anew, and otherwise for each picture, stand as it was groomed."""
+    found = [
+        (one, system)
+        for one in bpy.data.objects
+        for system in one.particle_systems
+        if system.use_hair_dynamics and not (system.point_cache and system.point_cache.is_baked)
+    ]
+    for _, system in found:
+        system.use_hair_dynamics = False
+    said = "hair dynamics that are not baked are off; bake them in Blender"
+    return [f"{listed(dict.fromkeys(one.name for one, _ in found))}: {said}"] if found else []
 
 
 def _curves(data: bpy.types.Curves, world: np.ndarray) -> Strands:

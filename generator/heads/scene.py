@@ -46,6 +46,7 @@ class BlendScene:
         can be used, no_camera says why.
     hair, rest: packages of the head's hair curves and of the rest of the scene, in the mesh's coordinates as
         read; "" where there is none.
+    clip: how near and how far the camera sees, in units of Blender; () where there is none.
     """
 
     file: str
@@ -57,6 +58,7 @@ class BlendScene:
     no_camera: str = ""
     hair: str = ""
     rest: str = ""
+    clip: Numbers = ()
 
     def moved(self, rotation: np.ndarray, pivot: np.ndarray, scale: float) -> BlendScene:
         """The scene of the mesh after x -> scale * rotation @ (x - pivot)."""
@@ -71,6 +73,24 @@ class BlendScene:
         eye = self._own_eye(mm_per_unit * self._scale)
         x, y, z = np.round(eye.points(self.world(pivot)), 6).tolist()
         return replace(self.camera, pivot_x=x, pivot_y=y, pivot_z=z)
+
+    def why_no_camera(self, pivot: np.ndarray, mm_per_unit: float, radius_mm: float) -> str:
+        """Why the scene's camera cannot be used for a head about a point of the mesh; "" where it can."""
+        seen = self.seen_pivot(pivot, mm_per_unit)
+        if seen is None or not self.clip:
+            return self.no_camera
+        near, far = (mm_per_unit * self._scale * one for one in self.clip)
+        nearest, farthest = seen.pivot_z - radius_mm, seen.pivot_z + radius_mm
+        if nearest >= near and farthest <= far:
+            return ""
+        return (
+            f"the scene's camera shows what is {near:.0f} to {far:.0f} mm before it (clip start and end), "
+            f"and the head is {nearest:.0f} to {farthest:.0f} mm before it"
+        )
+
+    def nearest_mm(self, camera: Camera) -> float:
+        """How near a camera sees; the mesh is as for :meth:`eye`."""
+        return self.clip[0] * self._scale if camera.of_scene and self.clip else 0.0
 
     def eye(self, camera: Camera) -> Eye:
         """Where a view's camera stands; the mesh is in frame U, mm, its pivot at the origin."""

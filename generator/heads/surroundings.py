@@ -32,8 +32,10 @@ def head_alone(mesh: HeadMesh, placement: Placement) -> HeadMesh:
     """A mesh as read without what does not belong to the head that was placed in it.
 
     Which that is follows from the recorded pivot and radius, so that a replay leaves out the same.
-    The very mesh where all of it belongs.
+    The very mesh where all of it belongs, and that of a scene, where all else may hide landmarks.
     """
+    if mesh.scene is not None:
+        return mesh
     kept = head_triangles(mesh, placement)
     return mesh if kept.all() else with_triangles(mesh, kept)
 

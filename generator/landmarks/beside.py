@@ -44,9 +44,9 @@ class Beside:
         if self._rest is not None:
             for row, view in enumerate(views):
                 posed = points[known] @ rotations[row].T
-                hidden[row, known] |= self._before(view.camera).hides(posed, np.eye(3)[None], [view.camera])[
-                    0
-                ]
+                before, near = self._before(view.camera), self._scene.nearest_mm(view.camera)
+                [behind] = before.hides(posed, np.eye(3)[None], [view.camera], from_mm=near)
+                hidden[row, known] |= behind
         return hidden
 
     def _before(self, camera: Camera) -> Surface:

@@ -176,22 +176,24 @@ class Surface:
         *,
         offsets: np.ndarray | None = None,
         nearer_mm: float = TOLERANCE_MM,
+        from_mm: float = 0.0,
     ) -> np.ndarray:
         """Which points the surface keeps from the cameras of N views, bool [N, P].
 
         points: float [P, 3], finite, frame C at pose zero, mm. rotations: R_C [N, 3, 3], of both.
         offsets: of the surface, float [N, 3], frame C at pose zero, mm. nearer_mm: by how much it has to be
-        before them.
+        before them. from_mm: what is nearer to the cameras hides nothing.
         """
         starts, rays, far = [], [], []
         for row, (rotation, camera) in enumerate(zip(rotations, cameras, strict=True)):
             posed = points @ rotation.T + camera.translation_mm
             origins, directions = camera.towards(posed)
+            origins = origins + from_mm * directions
             # The mesh stays where it is and the rays turn: (o - t) R is R^T (o - t).
             start = (origins - camera.translation_mm) @ rotation
             starts.append(start if offsets is None else start - offsets[row])
             rays.append(directions @ rotation)
-            far.append(posed[:, 2] - nearer_mm / np.linalg.norm(directions, axis=1))
+            far.append(posed[:, 2] - from_mm - nearer_mm / np.linalg.norm(directions, axis=1))
         if not starts:
             return np.zeros((0, len(points)), dtype=bool)
         hits = self.first_hits(np.concatenate(starts), np.concatenate(rays))

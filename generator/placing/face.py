@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import permutations
+from itertools import permutations, product
 
 import numpy as np
 
@@ -88,17 +88,16 @@ def find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
 
 
 def _find_face(head: Head, mesh: HeadMesh, eyes: Eyes) -> Placement:
-    first = _axes_of(head)[0]
-    if (placement := _straight(head, mesh, mesh, first, eyes)) is not None:
-        return placement
+    # An object in Blender has Blender's axes, or those of the file that it was imported from.
+    first = _axes_of(head)[: 2 if head.source == SCENE else 1]
     groups = clusters(mesh, MOST_GROUPS)
-    for part in groups:
-        if (placement := _straight(head, mesh, part, first, eyes)) is not None:
+    for part, axes in product((mesh, *groups), first):
+        if (placement := _straight(head, mesh, part, axes, eyes)) is not None:
             return placement
     for part in groups or [mesh]:
         for sight in find_around(part, eyes):
             axes = _nearest_axes(head, sight.turn)
-            maybe = axes != first and _apart_deg(axes, sight.turn) <= MAYBE_STRAIGHT_DEG
+            maybe = axes not in first and _apart_deg(axes, sight.turn) <= MAYBE_STRAIGHT_DEG
             if maybe and (placement := _straight(head, mesh, part, axes, eyes)) is not None:
                 return placement
             if (settled := _settle(part, sight, eyes)) is not None:
@@ -188,9 +187,8 @@ def _measure(
         is_kept[mesh.triangles[kept]] = True
         radius = round(float(reach[is_head & is_kept].max()) * scale, 2)
         kept = surroundings(mesh, in_source_axes, radius / scale)
-        notes.append(
-            f"{(~kept).sum()} of {len(kept)} triangles are left out: they lie apart from this face's head"
-        )
+        what = "are left out" if mesh.scene is None else "are rendered and bear no landmark"
+        notes.append(f"{(~kept).sum()} of {len(kept)} triangles {what}: they lie apart from this face's head")
     return Placement(
         units=units,
         mm_per_unit=scale,
@@ -202,7 +200,7 @@ def _measure(
         notes=tuple(notes),
         turned_deg=turned_deg or (0.0, 0.0, 0.0),
         scene_camera=mesh.scene.seen_pivot(in_source_axes, scale) if mesh.scene else None,
-        no_camera=mesh.scene.no_camera if mesh.scene else "",
+        no_camera=mesh.scene.why_no_camera(in_source_axes, scale, radius) if mesh.scene else "",
     )
 
 

@@ -21,8 +21,9 @@ def how_they_turn(folder: Path) -> dict[str, dict[str, Any]]:
     """Of each scene: why its head could not be turned by 90 degrees, as error, or what came of it.
 
     off: how far its surfaces are from where they should be. methods: of displacement, by material.
+    axes: of the head, a row an axis of the world.
     """
-    scenes = displaced, held, held_inside, linked, instanced
+    scenes = displaced, held, held_inside, linked, instanced, mirrored, simulated
     return {make.__name__: _turned(make, folder) for make in scenes}
 
 
@@ -73,6 +74,19 @@ def instanced(folder: Path) -> None:
     bpy.context.scene.collection.objects.link(head)
 
 
+def mirrored(_: Path) -> None:
+    head = _thing("Head")
+    head.scale, head.rotation_euler = (-0.5, 1.0, 2.0), (0.0, 0.0, np.pi / 2)
+
+
+def simulated(_: Path) -> None:
+    head = _thing("Head")
+    head.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    head.particle_systems[0].settings.type = "HAIR"
+    head.particle_systems[0].settings.count = 3
+    head.particle_systems[0].use_hair_dynamics = True
+
+
 def _turned(make: Any, folder: Path) -> dict[str, Any]:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     make(folder)
@@ -87,7 +101,8 @@ def _turned(make: Any, folder: Path) -> dict[str, Any]:
         return {"error": str(error)}
     off = np.abs(_points(head) - ((before - PIVOT) @ TURN.T + PIVOT)).max()
     methods = {one.name: one.displacement_method for one in bpy.data.materials}
-    return {"error": "", "problems": head.problems[1:], "off": float(off), "methods": methods}
+    axes = [[round(x, 6) for x in row[:3]] for row in head.frame[:3]]
+    return {"error": "", "problems": head.problems[1:], "off": float(off), "methods": methods, "axes": axes}
 
 
 def _points(head: SceneHead) -> np.ndarray:

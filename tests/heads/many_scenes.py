@@ -2,7 +2,8 @@
 """Scenes of every kind, and what is said of each, in one process: ``python many_scenes.py FOLDER``.
 
 FOLDER/said.json has an answer of generator.blender.describe a scene, FOLDER/turned.json what frozen_scenes.py
-says, FOLDER/hair.json what haired_scenes.py does; FOLDER/cameras.json has Blender's own projection
+says, FOLDER/hair.json what haired_scenes.py does, FOLDER/looks.json, order.json and through.json what
+rendered_scenes.py does; FOLDER/cameras.json has Blender's own projection
 matrices of some cameras.
 """
 
@@ -17,6 +18,7 @@ from pathlib import Path
 import bpy
 from frozen_scenes import how_they_turn
 from haired_scenes import how_hair_is_seen
+from rendered_scenes import how_they_look, what_one_sees_through, whether_order_matters
 
 from generator.blender import outside
 from generator.blender.describe import main as describe
@@ -59,6 +61,19 @@ def alone() -> None:
     eye.data.shape_keys.key_blocks["off"].mute = True
 
 
+def left_out() -> None:
+    """Others are in a collection that the view layer leaves out, and in one that is not rendered."""
+    thing("Anna")
+    for name in ("Excluded", "Unrendered"):
+        made = bpy.data.collections.new(name)
+        bpy.context.scene.collection.children.link(made)
+        other = thing(f"{name} head")
+        bpy.context.scene.collection.objects.unlink(other)
+        made.objects.link(other)
+    bpy.context.view_layer.layer_collection.children["Excluded"].exclude = True
+    bpy.data.collections["Unrendered"].hide_render = True
+
+
 def collection() -> None:
     two()
     made = bpy.data.collections.new("Head")
@@ -85,6 +100,7 @@ CASES = {
     "alone": (alone, ""),
     "collection": (collection, "Head"),
     "empty": (empty, ""),
+    "left out": (left_out, ""),
     "textured": (textured, ""),
 }
 
@@ -169,6 +185,9 @@ def main(folder: Path) -> None:
         said[name] = answer(folder / f"{name}.blend", "")
     (folder / "turned.json").write_text(json.dumps(how_they_turn(folder)))
     (folder / "hair.json").write_text(json.dumps(how_hair_is_seen(folder)))
+    (folder / "looks.json").write_text(json.dumps(how_they_look(folder)))
+    (folder / "order.json").write_text(json.dumps(whether_order_matters(folder)))
+    (folder / "through.json").write_text(json.dumps(what_one_sees_through(folder)))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     file = scattered(folder)
     said["scattered"] = answer(file, "Rig")

@@ -43,6 +43,7 @@ def test_the_head_is_the_one_named_or_tagged_or_the_only_one(said: dict[str, Any
     assert heads["tagged"] == "Anna"
     assert heads["alone"] == "Rig"
     assert heads["collection"] == "Head"
+    assert heads["left out"] == "Anna"
     assert said["two"]["error"] == f"{WHICH}; there are: 'Anna', 'Floor'"
     assert (
         said["two-misnamed"]["error"]
@@ -93,8 +94,13 @@ def test_heads_turn_as_one_or_are_refused(folder: Path) -> None:
         "'Lid' does not turn with the head: something else holds it; apply its modifiers, or parent what "
         "holds it to the head"
     )
-    for name in ("held_inside", "displaced", "linked", "instanced"):
+    for name in ("held_inside", "displaced", "linked", "instanced", "mirrored"):
         assert turned[name]["error"] == "" and turned[name]["off"] < 1e-5, (name, turned[name])
+    assert turned["simulated"]["problems"] == [
+        "'Head': hair dynamics that are not baked are off; bake them in Blender"
+    ]
+    # Of a mirrored one up is up, and forward is forward, or no face is found.
+    assert turned["mirrored"]["axes"] == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
 
 @pytest.mark.slow
@@ -104,6 +110,33 @@ def test_a_material_of_the_head_moves_no_surface(folder: Path) -> None:
     assert turned["problems"] == [
         "'Skin': displacement is rendered as bump, so that labels are where the surface is"
     ]
+
+
+@pytest.mark.slow
+def test_a_frozen_head_looks_as_blender_renders_it(folder: Path) -> None:
+    """At the frame of the file, with what nodes make of hair, what vertices carry, and metaballs."""
+    for name, seen in json.loads((folder / "looks.json").read_text()).items():
+        assert seen["shown"] > 0.01 and seen["off"] < 0.05, (name, seen)
+
+
+@pytest.mark.slow
+def test_hair_of_particles_looks_alike_whatever_was_rendered_before(folder: Path) -> None:
+    order = json.loads((folder / "order.json").read_text())
+    assert order["shown"] > 0.01 and order["off"] == 0, order
+
+
+@pytest.mark.slow
+def test_what_one_sees_through_hides_nothing(folder: Path) -> None:
+    said = json.loads((folder / "through.json").read_text())
+    parts = {name: tuple(one["parts"]) for name, one in said.items()}
+    seen, cut = ("seen", "all"), ("cut", "all")
+    assert parts == {
+        **dict.fromkeys(("solid", "solid group", "card", "one side"), seen),
+        **dict.fromkeys(("glass", "clear group", "nearly clear", "no alpha", "fog", "indirect layer"), ()),
+        **dict.fromkeys(("holdout", "holdout shader", "holdout layer"), cut),
+    }
+    assert [name for name, one in said.items() if one["cutout"]] == ["card"]
+    assert [name for name, one in said.items() if one["unknown"]] == ["one side"]
 
 
 @pytest.mark.slow
