@@ -86,10 +86,12 @@ coverage: $(VENV)/.dev
 	$(BIN)/coverage report --skip-covered --sort cover
 
 # 200 kills of hosts and workers at random moments, and 200 flipped bits in any file of a finished dataset
-# and of an unfinished build, instead of the 15 and 24 of every test run.
+# and of an unfinished build, instead of the 15 and 24 of every test run; and each export format reads each change
+# that a stranger may have made.
 soak: $(VENV)/.dev
 	HEADTURN_KILLS=200 HEADTURN_FLIPS=200 HEADTURN_SEED=$$(date +%s) $(BIN)/pytest -q -s --timeout 7200 \
 		tests/execution/test_flips.py tests/execution/test_faults.py -k "killed or flips"
+	HEADTURN_EXPORTS=100 $(BIN)/pytest -q tests/hostile/test_datasets.py
 
 # What was tried is kept in .fuzz and tried further; findings lie in .fuzz/findings.
 fuzz: $(VENV)/.fuzz

@@ -111,12 +111,19 @@ def test_the_commands_themselves(tmp_path: Path, started: str) -> None:
     assert not mark.exists(), mark.read_text()
 
 
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Modules that some command loads."""
+    done = run([sys.executable, "-W", "ignore", "-c", EVERYTHING], tmp_path_factory.mktemp("empty"))
+    found: list[str] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("started", ["as scripts", "as modules"])
-def test_every_command_and_its_children(tmp_path: Path, parametric_heads: Path, started: str) -> None:
-    loaded = json.loads(
-        run([sys.executable, "-W", "ignore", "-c", EVERYTHING], tmp_path).stdout.splitlines()[-1]
-    )
+def test_every_command_and_its_children(
+    tmp_path: Path, parametric_heads: Path, loaded: list[str], started: str
+) -> None:
     names = {name.partition(".")[0] for name in loaded} | set(sys.stdlib_module_names)
     assert {"bpy", "cv2", "mediapipe", "torch", "ray", "numpy", "json"} <= names
     data = tmp_path / "data"

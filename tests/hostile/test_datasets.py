@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -95,8 +96,34 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("door", DOORS)
-@pytest.mark.parametrize(("kind", "change"), [pytest.param(k, c, id=f"{k}, {n}") for k, n, c in CASES])
+EXPORTS_A_CASE = int(os.environ.get("HEADTURN_EXPORTS", "4"))
+"""Formats that read a change, by turns: all read with the same code. In `make soak` all of them do."""
+
+
+def doors_of(place: int) -> list[str]:
+    """Every command, and of the exports those whose turn it is."""
+    exports = [f"export {name}" for name in FORMATS]
+    turns = {exports[(EXPORTS_A_CASE * place + k) % len(exports)] for k in range(EXPORTS_A_CASE)}
+    return [door for door in DOORS if door not in exports or door in turns]
+
+
+def test_each_format_reads_changes_of_each_kind() -> None:
+    read: dict[str, set[str]] = {}
+    for place, (kind, _, _) in enumerate(CASES):
+        for door in doors_of(place):
+            read.setdefault(door, set()).add(kind)
+    assert read.keys() == DOORS.keys()
+    assert all(len(kinds) >= 4 for kinds in read.values()), read
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "door"),
+    [
+        pytest.param(kind, change, door, id=f"{kind}, {name}-{door}")
+        for place, (kind, name, change) in enumerate(CASES)
+        for door in doors_of(place)
+    ],
+)
 def test_nothing_gets_out_or_in(
     folder: Path,
     door: str,
