@@ -17,7 +17,9 @@ from pathlib import Path
 import pytest
 
 from generator import cli
+from generator.cli import app
 from generator.execution.lanes import renderer
+from generator.execution.stopping import Stopped
 
 
 def headturn(*arguments: str | Path, monkeypatch: pytest.MonkeyPatch) -> int:
@@ -232,3 +234,16 @@ def test_listing_a_head_that_cannot_be_read_is_told_to_scripts(
     rows = {Path(row["path"]).name: row for row in json.loads(capsys.readouterr().out)["heads"]}
     assert (rows["broken.obj"]["skipped"], rows["fine.obj"]["skipped"]) == (True, False)
     assert headturn("heads", "list", tmp_path / "fine.obj", monkeypatch=monkeypatch) == 0
+
+
+@pytest.mark.parametrize(("line", "further"), [("build x", True), ("verify x", False), ("heads make", False)])
+def test_only_what_goes_on_is_said_to(
+    line: str, further: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop() -> None:
+        raise Stopped(signal.SIGINT)
+
+    monkeypatch.setattr(app, "main", stop)
+    assert headturn(*line.split(), monkeypatch=monkeypatch) == 130
+    again = "; run the same command again to continue" if further else ""
+    assert capsys.readouterr().err == f"headturn: stopped by SIGINT{again}\n"
